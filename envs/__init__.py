@@ -1,0 +1,1 @@
+"""The quadruped and its world: simulation, scene, observations and rewards, without learning."""

@@ -1,0 +1,350 @@
+"""Robot, floor and sensors, assembled into one MuJoCo model with MjSpec.
+
+The robot itself is `resources/go1/go1.xml`. This module adds what surrounds it: the floor, the
+light and the sky, the sensors that the environment reads, and the solver's options. Stepping the
+model is left to `envs.simulation`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import mujoco
+
+LEGS: tuple[str, ...] = ("FR", "FL", "RR", "RL")
+"""The legs, in the order of every per-leg array."""
+
+JOINT_NAMES: tuple[str, ...] = tuple(
+    f"{leg}_{joint}_joint" for leg in LEGS for joint in ("hip", "thigh", "calf")
+)
+"""The actuated joints, in the order of every per-joint array and of the actuators."""
+
+# fmt: off
+STAND_JOINT_POS: tuple[float, ...] = (
+    -0.1, 0.8, -1.5,
+    0.1, 0.8, -1.5,
+    -0.1, 1.0, -1.5,
+    0.1, 1.0, -1.5,
+)
+# fmt: on
+"""Joint angles of the standing pose, in rad, in the order of `JOINT_NAMES`."""
+
+STAND_HEIGHT = 0.32475
+"""Trunk height in m at which a level robot in the standing pose touches flat ground."""
+
+FOOT_RADIUS = 0.023
+"""Radius of the spherical rubber feet, in m."""
+
+Look = Literal["primitives", "menagerie"]
+Integrator = Literal["euler", "implicit", "implicitfast"]
+Cone = Literal["pyramidal", "elliptic"]
+Solver = Literal["newton", "cg"]
+
+_VISUAL_GROUP = 2
+"""Geom group of shapes only looked at; collision shapes are in group 3, hidden by default."""
+
+_ROBOT_FILE = Path(__file__).resolve().parents[1] / "resources" / "go1" / "go1.xml"
+
+_INTEGRATORS: dict[Integrator, mujoco.mjtIntegrator] = {
+    "euler": mujoco.mjtIntegrator.mjINT_EULER,
+    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+}
+_CONES: dict[Cone, mujoco.mjtCone] = {
+    "pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL,
+    "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC,
+}
+_SOLVERS: dict[Solver, mujoco.mjtSolver] = {
+    "newton": mujoco.mjtSolver.mjSOL_NEWTON,
+    "cg": mujoco.mjtSolver.mjSOL_CG,
+}
+
+
+class SceneError(RuntimeError):
+    """Raised where a scene needs something that this machine does not have."""
+
+
+@dataclass(frozen=True)
+class SceneCfg:
+    """Choose the physics and the look of the scene; a bad value raises `ValueError`."""
+
+    timestep: float = 0.005
+    """Physics step in s."""
+
+    integrator: Integrator = "implicitfast"
+    """Integrator; `implicitfast` treats the motors' damping implicitly."""
+
+    cone: Cone = "pyramidal"
+    """Friction cone."""
+
+    solver: Solver = "newton"
+    """Constraint solver."""
+
+    iterations: int = 10
+    """Upper bound on the solver's iterations; robots that drop and stumble come out as with 100."""
+
+    ls_iterations: int = 20
+    """Upper bound on the line search's iterations; robots come out as with 50."""
+
+    floor_friction: float = 0.8
+    """Sliding friction coefficient of every contact with the floor."""
+
+    floor_solref: tuple[float, float] = (0.02, 1.0)
+    """Time constant (s) and damping ratio of every contact with the floor."""
+
+    look: Look = "primitives"
+    """Shapes to show: our own, or the meshes of the `mujoco_menagerie` package."""
+
+    def __post_init__(self) -> None:
+        """Refuse values that MuJoCo would silently take or repair."""
+        _require_number("timestep", self.timestep, low=0.0, high=0.02)
+        _require_choice("integrator", self.integrator, get_args(Integrator))
+        _require_choice("cone", self.cone, get_args(Cone))
+        _require_choice("solver", self.solver, get_args(Solver))
+        _require_count("iterations", self.iterations)
+        _require_count("ls_iterations", self.ls_iterations)
+        _require_number("floor_friction", self.floor_friction, low=0.0, high=10.0)
+        if len(self.floor_solref) != 2:
+            raise ValueError(
+                f"floor_solref is {self.floor_solref!r}: it takes two numbers,"
+                " a time constant (s) and a damping ratio"
+            )
+        # Below two physics steps MuJoCo would stretch the time constant without a word (refsafe).
+        time_constant, damping_ratio = self.floor_solref
+        _require_number(
+            "floor_solref[0]", time_constant, low=2 * self.timestep, high=1.0, closed=True
+        )
+        _require_number("floor_solref[1]", damping_ratio, low=0.0, high=10.0)
+        _require_choice("look", self.look, get_args(Look))
+
+
+def build_scene(cfg: SceneCfg) -> mujoco.MjModel:
+    """Compile the scene that `cfg` describes.
+
+    Raises:
+        SceneError: The look needs a package or meshes that are not there.
+    """
+    return make_spec(cfg).compile()
+
+
+def make_spec(cfg: SceneCfg) -> mujoco.MjSpec:
+    """Assemble robot, floor and sensors, open to further editing before it is compiled.
+
+    Raises:
+        SceneError: The look needs a package or meshes that are not there.
+    """
+    spec = mujoco.MjSpec.from_file(str(_ROBOT_FILE))
+    spec.modelname = "go1_scene"
+    _set_options(spec, cfg)
+    _add_surroundings(spec)
+    _add_floor(spec, cfg)
+    _add_foot_sensors(spec)
+    _add_contact_sensors(spec)
+    if cfg.look == "menagerie":
+        _dress_in_menagerie(spec)
+    return spec
+
+
+def sensor_slice(model: mujoco.MjModel, first_name: str, count: int) -> slice:
+    """Return the columns of `sensordata` that `count` sensors fill, from `first_name` on.
+
+    Raises:
+        ValueError: There is no such sensor, there are fewer than `count` from it on, or they are
+            not of one kind and size, so that the columns would mix quantities.
+    """
+    first = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, first_name)
+    if first < 0:
+        raise ValueError(f"first_name is {first_name!r}: the model has no such sensor")
+    if not 1 <= count <= model.nsensor - first:
+        raise ValueError(
+            f"count is {count}: from {first_name!r} on the model has {model.nsensor - first}"
+            " sensors, and at least 1 is needed"
+        )
+    kinds = {
+        (int(model.sensor_type[i]), int(model.sensor_dim[i])) for i in range(first, first + count)
+    }
+    if len(kinds) != 1:
+        names = [model.sensor(i).name for i in range(first, first + count)]
+        raise ValueError(f"the {count} sensors from {first_name!r} on are not contiguous: {names}")
+    start = int(model.sensor_adr[first])
+    return slice(start, start + count * int(model.sensor_dim[first]))
+
+
+def _require_number(
+    name: str, value: float, *, low: float, high: float, closed: bool = False
+) -> None:
+    """Refuse a number outside (low, high], or outside [low, high] where `closed`."""
+    inside = (low <= value if closed else low < value) and value <= high
+    if not (math.isfinite(value) and inside):
+        raise ValueError(
+            f"{name} is {value!r}: it must be {'at least' if closed else 'above'} {low:g}"
+            f" and at most {high:g}"
+        )
+
+
+def _require_count(name: str, value: int) -> None:
+    """Refuse a count below 1."""
+    if value < 1:
+        raise ValueError(f"{name} is {value!r}: it must be at least 1")
+
+
+def _require_choice(name: str, value: str, allowed: tuple[str, ...]) -> None:
+    """Refuse a word that is not among the `allowed` ones."""
+    if value not in allowed:
+        raise ValueError(f"{name} is {value!r}: it must be one of {', '.join(allowed)}")
+
+
+def _set_options(spec: mujoco.MjSpec, cfg: SceneCfg) -> None:
+    """Set the physics options."""
+    spec.option.timestep = cfg.timestep
+    spec.option.integrator = _INTEGRATORS[cfg.integrator]
+    spec.option.cone = _CONES[cfg.cone]
+    spec.option.solver = _SOLVERS[cfg.solver]
+    spec.option.iterations = cfg.iterations
+    spec.option.ls_iterations = cfg.ls_iterations
+
+
+def _add_surroundings(spec: mujoco.MjSpec) -> None:
+    """Add sky, light and an off-screen buffer large enough for full-HD video."""
+    visual: Any = spec.visual  # the stubs name its parts by classes that have no public fields
+    visual.global_.offwidth, visual.global_.offheight = 1920, 1080
+    visual.headlight.ambient = (0.3, 0.3, 0.3)
+    visual.headlight.diffuse = (0.5, 0.5, 0.5)
+    visual.headlight.specular = (0.1, 0.1, 0.1)
+    visual.quality.shadowsize = 4096
+    visual.rgba.haze = (0.9, 0.93, 0.96, 1.0)
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=(0.93, 0.95, 0.97),
+        rgb2=(0.55, 0.66, 0.78),
+        width=256,
+        height=256 * 6,
+    )
+    spec.body("trunk").add_light(
+        # The light keeps its place above the robot, so that the shadow never leaves the shadow map.
+        mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM,
+        type=mujoco.mjtLightType.mjLIGHT_SPOT,
+        pos=(0.9, -1.2, 3.0),
+        dir=(-0.3, 0.4, -1.0),
+        cutoff=60.0,
+        exponent=1.0,
+        diffuse=(0.6, 0.6, 0.6),
+        specular=(0.3, 0.3, 0.3),
+    )
+
+
+def _add_floor(spec: mujoco.MjSpec, cfg: SceneCfg) -> None:
+    """Add an endless checkered floor whose contact parameters decide for every contact."""
+    spec.add_texture(
+        name="floor",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        mark=mujoco.mjtMark.mjMARK_EDGE,
+        rgb1=(0.55, 0.60, 0.66),
+        rgb2=(0.48, 0.53, 0.60),
+        markrgb=(0.70, 0.74, 0.78),
+        width=300,
+        height=300,
+    )
+    material = spec.add_material(name="floor", texrepeat=(2, 2), texuniform=True, reflectance=0.03)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
+    spec.worldbody.add_geom(
+        name="floor",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=(0.0, 0.0, 0.05),
+        material="floor",
+        contype=1,
+        conaffinity=0,
+        condim=3,
+        # Without priority MuJoCo takes the larger friction of a pair: no floor could be slippery.
+        priority=1,
+        friction=(cfg.floor_friction, 0.02, 0.01),
+        solref=cfg.floor_solref,
+    )
+
+
+def _add_foot_sensors(spec: mujoco.MjSpec) -> None:
+    """Add position (m) and linear velocity (m/s) of every foot's centre, in the world frame."""
+    for suffix, kind in (
+        ("pos", mujoco.mjtSensor.mjSENS_FRAMEPOS),
+        ("vel", mujoco.mjtSensor.mjSENS_FRAMELINVEL),
+    ):
+        for leg in LEGS:
+            spec.add_sensor(
+                name=f"{leg}_foot_{suffix}",
+                type=kind,
+                objtype=mujoco.mjtObj.mjOBJ_SITE,
+                objname=f"{leg}_foot",
+            )
+
+
+def _add_contact_sensors(spec: mujoco.MjSpec) -> None:
+    """Add the number of contacts of every collision shape: feet, trunk, head, then leg by leg."""
+    feet = [f"{leg}_foot" for leg in LEGS]
+    limbs = [f"{leg}_{part}" for leg in LEGS for part in ("hip", "thigh", "shank")]
+    for geom in (*feet, "trunk", "head", *limbs):
+        spec.add_sensor(
+            name=f"{geom}_contact",
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_GEOM,
+            objname=geom,
+            # What to report (found), how to choose among contacts (any), how many to report.
+            intprm=(1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1),
+        )
+
+
+def _dress_in_menagerie(spec: mujoco.MjSpec) -> None:
+    """Show the meshes of the `mujoco_menagerie` package's Go1 in place of our primitives."""
+    source = _load_menagerie_go1()
+    mesh_dir = Path(source.modelfiledir) / source.meshdir
+    for geom in [geom for geom in spec.geoms if geom.group == _VISUAL_GROUP]:
+        spec.delete(geom)
+    for mesh in source.meshes:
+        name = mesh.name or Path(mesh.file).stem  # a mesh without a name goes by its file's
+        spec.add_mesh(name=f"menagerie_{name}", file=str(mesh_dir / mesh.file), scale=mesh.scale)
+    for material in source.materials:
+        spec.add_material(
+            name=f"menagerie_{material.name}",
+            rgba=material.rgba,
+            specular=material.specular,
+            shininess=material.shininess,
+        )
+    for geom in source.geoms:
+        body = spec.body(geom.parent.name)
+        if geom.type != mujoco.mjtGeom.mjGEOM_MESH or body is None:
+            continue
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=f"menagerie_{geom.meshname}",
+            material=f"menagerie_{geom.material}" if geom.material else "silver",
+            pos=geom.pos,
+            quat=geom.quat,
+            group=_VISUAL_GROUP,
+            contype=0,
+            conaffinity=0,
+            mass=0.0,
+        )
+
+
+def _load_menagerie_go1() -> mujoco.MjSpec:
+    """Return MuJoCo Menagerie's Go1, which its package fetches into a cache on first use."""
+    try:
+        menagerie: Any = importlib.import_module("mujoco_menagerie")
+    except ImportError as error:
+        raise SceneError(
+            "look 'menagerie' needs the package mujoco_menagerie: pip install mujoco_menagerie,"
+            " or use look 'primitives'"
+        ) from error
+    try:
+        return menagerie.get("unitree_go1").spec("go1")
+    except (menagerie.MenagerieError, OSError, ValueError) as error:
+        raise SceneError(
+            "look 'menagerie' found no Go1 in the cache of mujoco_menagerie and could not fetch it"
+            f" ({error}): fetch it once where there is a network, or use look 'primitives'"
+        ) from error
