@@ -1,0 +1,203 @@
+"""Feet over time: contacts and phase at the control rate, landings at the physics rate.
+
+A landing peak lasts about 20 ms, so its speed is read from every physics step. Which contact is a
+landing is decided by the debounced contacts of `envs.phase`, some control steps later.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+
+from envs.phase import CausalContacts
+
+__all__ = ["FootfallCfg", "Footfalls"]
+
+_NUM_FEET = 4
+
+
+@dataclass
+class FootfallCfg:
+    """How contacts become footfalls."""
+
+    min_segment: float = 0.04
+    """Shortest contact or swing that counts, s; shorter ones are merged into their neighbours."""
+    max_segment: float = 1.0
+    """Longest contact or swing that has a phase, s; longer ones are standing."""
+    landing_window: float = 0.02
+    """Time before contact in which the largest downward speed is the landing speed, s."""
+
+    def __post_init__(self) -> None:
+        """Check the times.
+
+        Raises:
+            ValueError: If a time is not positive.
+        """
+        for name in ("min_segment", "max_segment", "landing_window"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"footfall.{name} must be > 0, got {getattr(self, name)}")
+
+
+class Footfalls:
+    """Follows the feet of every robot: contact, phase, landings and swings.
+
+    Order within a control step: `begin`, `record` after each physics step, `update` once.
+    """
+
+    def __init__(self, cfg: FootfallCfg, num_envs: int, timestep: float, decimation: int) -> None:
+        """Allocate the history.
+
+        Args:
+            cfg: Times.
+            num_envs: Number of robots.
+            timestep: Physics step, s.
+            decimation: Physics steps a control step.
+        """
+        step_dt = timestep * decimation
+        self.min_steps = max(1, round(cfg.min_segment / step_dt))
+        """Shortest segment, in control steps."""
+        self.max_steps = round(cfg.max_segment / step_dt)
+        """Longest segment with a phase, in control steps."""
+        self._decimation = decimation
+        self._window = max(1, round(cfg.landing_window / timestep))
+        # A landing is confirmed min_steps - 1 control steps late and looks back over its window.
+        self._depth = (self.min_steps + math.ceil(self._window / decimation)) * decimation
+        self._cursor = 0
+        shape = (num_envs, _NUM_FEET)
+        self._drop = torch.zeros(self._depth, *shape)
+        self._raise = torch.zeros(decimation, *shape)
+        self._touch = torch.zeros(self._depth, *shape, dtype=torch.bool)
+        self._contacts = CausalContacts(num_envs, _NUM_FEET, min_steps=self.min_steps)
+        self.drop_sq = torch.zeros(shape)
+        """Mean over the physics steps of max(-v_z, 0)^2, (m/s)^2. Shape: (num_envs, 4)."""
+        self.raise_sq = torch.zeros(shape)
+        """Mean over the physics steps of max(v_z, 0)^2, (m/s)^2. Shape: (num_envs, 4)."""
+        self.contact_share = torch.zeros(shape)
+        """Share of the physics steps with contact. Shape: (num_envs, 4)."""
+        self.raw_contact = torch.zeros(shape, dtype=torch.bool)
+        """Contact at any physics step of the control step. Shape: (num_envs, 4)."""
+        self.landing_speed = torch.zeros(shape)
+        """Landing speed where `touchdown`, else 0, m/s. Shape: (num_envs, 4)."""
+        self.swing_apex = torch.zeros(shape)
+        """Highest clearance of the current or, in stance, last swing, m. Shape: (num_envs, 4)."""
+
+    @property
+    def contact(self) -> torch.Tensor:
+        """Debounced contact, bool. Shape: (num_envs, 4)."""
+        return self._contacts.contact
+
+    @property
+    def touchdown(self) -> torch.Tensor:
+        """Feet whose landing was confirmed in this control step, bool. Shape: (num_envs, 4)."""
+        return self._contacts.touchdown
+
+    @property
+    def phase(self) -> torch.Tensor:
+        """Causal phase, from the durations of the foot's last segments. Shape: (num_envs, 4)."""
+        return self._contacts.phase
+
+    def begin(self) -> None:
+        """Make room for the physics steps of a control step."""
+        keep = self._depth - self._decimation
+        self._drop[:keep] = self._drop[self._decimation :].clone()
+        self._touch[:keep] = self._touch[self._decimation :].clone()
+        self._cursor = 0
+
+    def record(self, foot_vel_z: torch.Tensor, found: torch.Tensor) -> None:
+        """Take in one physics step.
+
+        Args:
+            foot_vel_z: Vertical velocity of each foot in the world, m/s. Shape: (num_envs, 4).
+            found: Number of contacts of each foot. Shape: (num_envs, 4).
+        """
+        row = self._depth - self._decimation + self._cursor
+        torch.clamp(-foot_vel_z, min=0.0, out=self._drop[row])
+        torch.clamp(foot_vel_z, min=0.0, out=self._raise[self._cursor])
+        torch.gt(found, 0.0, out=self._touch[row])
+        self._cursor += 1
+
+    def update(self, clearance: torch.Tensor) -> None:
+        """Close the control step: contacts, phase, landings and apexes.
+
+        Args:
+            clearance: Height under each foot, m. Shape: (num_envs, 4).
+        """
+        recent = slice(self._depth - self._decimation, self._depth)
+        self.drop_sq = self._drop[recent].square().mean(dim=0)
+        self.raise_sq = self._raise.square().mean(dim=0)
+        touch = self._touch[recent]
+        self.contact_share = touch.float().mean(dim=0)
+        self.raw_contact = touch.any(dim=0)
+        # Before the update: a foot that the update declares landed has reached its apex already.
+        in_stance = self._contacts.contact.clone()
+        self._contacts.update(self.raw_contact)
+        rising = torch.maximum(self.swing_apex, clearance)
+        lifting = in_stance & ~self._contacts.contact
+        self.swing_apex = torch.where(
+            lifting, clearance, torch.where(in_stance, self.swing_apex, rising)
+        )
+        self.landing_speed = self._landing_speed()
+
+    def reset(self, mask: torch.Tensor, found: torch.Tensor) -> None:
+        """Forget the masked robots' past.
+
+        Args:
+            mask: Robots that begin an episode. Shape: (num_envs,).
+            found: Number of contacts of each foot now. Shape: (num_envs, 4).
+        """
+        raw = found > 0.0
+        column = mask.unsqueeze(1)
+        self._contacts.reset(mask, raw)
+        self._drop.masked_fill_(column, 0.0)
+        self._raise.masked_fill_(column, 0.0)
+        torch.where(column, raw, self._touch, out=self._touch)
+        self.raw_contact = torch.where(column, raw, self.raw_contact)
+        for name in ("drop_sq", "raise_sq", "contact_share", "landing_speed", "swing_apex"):
+            setattr(self, name, getattr(self, name).masked_fill(column, 0.0))
+
+    def state_dict(self) -> dict[str, torch.Tensor]:
+        """Return all that is needed to continue bit for bit."""
+        state = {name: getattr(self, name).clone() for name in _STATE_TENSORS}
+        contacts = self._contacts.state_dict()
+        return state | {f"contacts/{name}": value for name, value in contacts.items()}
+
+    def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
+        """Continue from a `state_dict`."""
+        for name in _STATE_TENSORS:
+            setattr(self, name, state[name].clone())
+        prefix = "contacts/"
+        contacts = {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}
+        self._contacts.load_state_dict(contacts)
+
+    def _landing_speed(self) -> torch.Tensor:
+        """Return the largest downward speed in the window that ends with each first contact.
+
+        The physics step that first finds contact still carries the velocity of the approach: the
+        contact force acts from the next one on. It belongs to the window.
+        """
+        result = torch.zeros_like(self.drop_sq)
+        env_ids, feet = self.touchdown.nonzero(as_tuple=True)
+        if env_ids.numel() == 0:
+            return result
+        # The run of contact that was just confirmed began min_steps - 1 control steps ago.
+        begin = self._depth - self.min_steps * self._decimation
+        drop, touch = self._drop[:, env_ids, feet], self._touch[begin:, env_ids, feet]
+        first = begin + touch.int().argmax(dim=0)
+        row = torch.arange(self._depth).unsqueeze(1)
+        inside = (row <= first) & (row > first - self._window)
+        result[env_ids, feet] = (drop * inside).amax(dim=0)
+        return result
+
+
+_STATE_TENSORS = (
+    "_drop",
+    "_touch",
+    "drop_sq",
+    "raise_sq",
+    "contact_share",
+    "raw_contact",
+    "landing_speed",
+    "swing_apex",
+)
