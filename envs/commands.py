@@ -1,0 +1,92 @@
+"""What the robot is asked to do: velocity commands and the quiet factor beta."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+
+__all__ = ["CommandSampler", "CommandsCfg"]
+
+BETA = 3
+"""Column of the quiet factor in the command tensor."""
+
+
+@dataclass
+class CommandsCfg:
+    """Ranges of the commands, in the body frame."""
+
+    lin_vel_x: tuple[float, float] = (-1.0, 1.0)
+    """Forward velocity, m/s."""
+    lin_vel_y: tuple[float, float] = (-0.5, 0.5)
+    """Velocity to the left, m/s."""
+    ang_vel_z: tuple[float, float] = (-1.0, 1.0)
+    """Yaw rate, rad/s."""
+    beta: tuple[float, float] = (0.0, 1.0)
+    """Quiet factor; 0 asks for speed, 1 for silence."""
+    standing_fraction: float = 0.1
+    """Share of the velocity commands that are zero."""
+    resampling_time: float = 10.0
+    """Time between new velocity commands within an episode, s."""
+
+    def __post_init__(self) -> None:
+        """Check the ranges.
+
+        Raises:
+            ValueError: If a range is empty, or a share or a time is out of bounds.
+        """
+        for name in ("lin_vel_x", "lin_vel_y", "ang_vel_z", "beta"):
+            low, high = getattr(self, name)
+            if not low <= high:
+                raise ValueError(
+                    f"commands.{name} must be (low, high) with low <= high, got {(low, high)}"
+                )
+        if not 0.0 <= self.beta[0] <= self.beta[1] <= 1.0:
+            raise ValueError(f"commands.beta must lie in [0, 1], got {self.beta}")
+        if not 0.0 <= self.standing_fraction <= 1.0:
+            raise ValueError(
+                f"commands.standing_fraction must be in [0, 1], got {self.standing_fraction}"
+            )
+        if self.resampling_time <= 0.0:
+            raise ValueError(f"commands.resampling_time must be > 0, got {self.resampling_time}")
+
+
+class CommandSampler:
+    """Draws velocity commands, and beta once an episode (paper, section II-C)."""
+
+    def __init__(
+        self, cfg: CommandsCfg, num_envs: int, generator: torch.Generator, device: torch.device
+    ) -> None:
+        """Allocate the commands; nothing is drawn before `resample`."""
+        self.cfg = cfg
+        self.generator = generator
+        self.command = torch.zeros(num_envs, 4, device=device)
+        """Commands (v_x, v_y, w_z, beta). Shape: (num_envs, 4)."""
+        ranges = torch.tensor([cfg.lin_vel_x, cfg.lin_vel_y, cfg.ang_vel_z, cfg.beta])
+        self._low = ranges[:, 0].to(device)
+        self._span = (ranges[:, 1] - ranges[:, 0]).to(device)
+
+    @property
+    def beta(self) -> torch.Tensor:
+        """Quiet factor of each environment. Shape: (num_envs,)."""
+        return self.command[:, BETA]
+
+    @property
+    def standing(self) -> torch.Tensor:
+        """Which environments are asked to stand still. Shape: (num_envs,)."""
+        return (self.command[:, :BETA] == 0.0).all(dim=1)
+
+    def resample(self, mask: torch.Tensor, with_beta: bool) -> None:
+        """Draw new velocity commands for the masked environments, in place.
+
+        Args:
+            mask: Which environments get a new command. Shape: (num_envs,).
+            with_beta: Whether beta is drawn too, as it is at the start of an episode.
+        """
+        draw = torch.rand(self.command.shape[0], 5, generator=self.generator, device=mask.device)
+        fresh = self._low + self._span * draw[:, :4]
+        standing = draw[:, 4] < self.cfg.standing_fraction
+        fresh[:, :BETA].masked_fill_(standing.unsqueeze(1), 0.0)
+        if not with_beta:
+            fresh[:, BETA] = self.command[:, BETA]
+        torch.where(mask.unsqueeze(1), fresh, self.command, out=self.command)

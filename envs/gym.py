@@ -1,0 +1,404 @@
+"""The same environment for Gymnasium: one robot, or a batch of them as a `VectorEnv`.
+
+`import envs.gym` registers `MUTE/Go1-v0` for `gymnasium.make` and `gymnasium.make_vec`; without an
+import, `gymnasium.make("envs.gym:MUTE/Go1-v0")` does both. Observations are the group `policy` of
+`envs.quadruped_env`, and what a critic may see besides stands in `info["privileged"]`. The phase
+terms of the reward use the true, causal phase here: nothing estimates it outside of training.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+import torch
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from envs.observations import OBS_DIM
+from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv, QuadrupedEnvCfg
+from envs.rewards import RewardsCfg
+
+__all__ = ["Go1Env", "Go1VectorEnv"]
+
+_OPTIONS = ("command", "beta")
+
+
+class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
+    """One Go1 on the ground.
+
+    Observation: o_t, scaled and noised, shape (46,). Action: joint offsets over `action_scale`,
+    shape (12,). Both float32. A fall terminates and the end of `episode_length` truncates, so no
+    time limit needs to be wrapped around. `info` holds `privileged` (what a critic may see) and
+    `landing_speed` (m/s, of the feet that landed in this step, else 0), in `reset` and `step`.
+
+    Options of `reset`, for the episode that begins: `command`, (v_x, v_y, w_z) in the body frame,
+    m/s and rad/s, held to its end; `beta`, the quiet factor in [0, 1]. Left out, they are drawn.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012, Gymnasium's
+
+    def __init__(
+        self,
+        cfg: QuadrupedEnvCfg | None = None,
+        render_mode: str | None = None,
+        width: int = 640,
+        height: int = 480,
+    ) -> None:
+        """Describe the environment; the robot itself is made by the first `reset`.
+
+        Args:
+            cfg: The task, or None for the default one with the true phase; `num_envs`, `seed` and
+                `num_threads` are not used: there is one robot, and `reset` takes the seed.
+            render_mode: None or "rgb_array".
+            width: Width of a frame, pixels.
+            height: Height of a frame, pixels.
+
+        Raises:
+            ValueError: If the render mode is unknown or the reward asks for an estimated phase.
+        """
+        # One robot keeps one thread busy; more would only wait.
+        self._robots = _Robots(replace(_checked(cfg), num_envs=1, num_threads=1))
+        _check_render_mode(render_mode, self.metadata)
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": self._robots.render_fps}
+        self.observation_space = _observation_space()
+        self.action_space = _action_space(self._robots.cfg)
+        self._camera = _Camera(width, height)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin an episode; a seed decides all of it, the robot's randomised physics included.
+
+        Raises:
+            ValueError: If an option is unknown, or not as the class says.
+        """
+        super().reset(seed=seed)
+        new = seed is not None or not self._robots.exist
+        self._robots.reset(int(self.np_random.integers(2**31)) if new else None, options)
+        return self._robots.observations()[0], self._info()
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Advance by one control step.
+
+        Args:
+            action: Joint offsets over `action_scale`. Shape: (12,).
+
+        Returns:
+            The observation, which at an episode's end is its last, the reward, whether the robot
+            fell, whether the time is over, and `info`.
+
+        Raises:
+            gymnasium.error.ResetNeeded: If there was no `reset` before.
+            ValueError: If the action has another shape.
+        """
+        rewards, terminated, truncated = self._robots.step(np.asarray(action)[np.newaxis])
+        observation = self._robots.observations()[0]
+        flags = bool(terminated[0]), bool(truncated[0])
+        return observation, float(rewards[0]), *flags, self._info()
+
+    def render(self) -> np.ndarray | None:
+        """Return a picture that follows the robot, uint8, shape (height, width, 3), or None.
+
+        Raises:
+            gymnasium.error.ResetNeeded: If there was no `reset` before.
+        """
+        if self.render_mode is None:
+            return None
+        return self._camera.frame(self._robots.env, 0)
+
+    def close(self) -> None:
+        """Release the renderer."""
+        self._camera.close()
+
+    def _info(self) -> dict[str, Any]:
+        return {name: values[0] for name, values in self._robots.infos().items()}
+
+
+class Go1VectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
+    """A batch of Go1 robots in one simulation, far faster than as many `Go1Env`.
+
+    Spaces, info and options are those of `Go1Env`, with an axis of robots in front; the options
+    `command` and `beta` may be one for all, too, and hold for the first episode of every robot. A
+    robot whose episode ends begins anew in the same step: its last observation and info are then in
+    `infos["final_obs"]` and `infos["final_info"]`, as Gymnasium's `SyncVectorEnv` gives them.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012, Gymnasium's
+        "render_modes": ["rgb_array"],
+        "render_fps": 50,
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        cfg: QuadrupedEnvCfg | None = None,
+        render_mode: str | None = None,
+        width: int = 640,
+        height: int = 480,
+    ) -> None:
+        """Describe the environment; the robots are made by the first `reset`.
+
+        Args:
+            num_envs: Number of robots.
+            cfg: The task, or None for the default one with the true phase; its `num_envs` and
+                `seed` are not used: `reset` takes the seed.
+            render_mode: None or "rgb_array".
+            width: Width of a frame, pixels.
+            height: Height of a frame, pixels.
+
+        Raises:
+            ValueError: If an argument is out of its range, or the reward asks for an estimated
+                phase.
+        """
+        self._robots = _Robots(replace(_checked(cfg), num_envs=num_envs))
+        _check_render_mode(render_mode, self.metadata)
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": self._robots.render_fps}
+        self.single_observation_space = _observation_space()
+        self.single_action_space = _action_space(self._robots.cfg)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._camera = _Camera(width, height)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin an episode everywhere; a seed decides all that follows, physics included.
+
+        Raises:
+            ValueError: If an option is unknown, or not as the class says.
+        """
+        super().reset(seed=seed)
+        new = seed is not None or not self._robots.exist
+        self._robots.reset(int(self.np_random.integers(2**31)) if new else None, options)
+        return self._robots.observations(), self._infos()
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Advance every robot by one control step, and begin anew where an episode ended.
+
+        Args:
+            actions: Joint offsets over `action_scale`. Shape: (num_envs, 12).
+
+        Returns:
+            Observations (num_envs, 46), rewards (num_envs,), both float32, whether each robot fell,
+            whether its time is over, and `infos`.
+
+        Raises:
+            gymnasium.error.ResetNeeded: If there was no `reset` before.
+            ValueError: If the actions have another shape.
+        """
+        rewards, terminated, truncated = self._robots.step(np.asarray(actions))
+        finished = terminated | truncated
+        ends: dict[str, Any] = {}
+        if finished.any():
+            ends = self._final_infos(finished)
+            self._robots.reset_finished(finished)
+        observations = self._robots.observations()
+        return observations, rewards, terminated, truncated, {**ends, **self._infos()}
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """Return a picture of each robot, uint8, shape (height, width, 3), or None.
+
+        Raises:
+            gymnasium.error.ResetNeeded: If there was no `reset` before.
+        """
+        if self.render_mode is None:
+            return None
+        return tuple(self._camera.frame(self._robots.env, i) for i in range(self.num_envs))
+
+    def close_extras(self) -> None:
+        """Release the renderer."""
+        self._camera.close()
+
+    def _infos(self) -> dict[str, Any]:
+        infos: dict[str, Any] = {}
+        for name, values in self._robots.infos().items():
+            infos |= {name: values, f"_{name}": np.ones(self.num_envs, dtype=np.bool_)}
+        return infos
+
+    def _final_infos(self, finished: np.ndarray) -> dict[str, Any]:
+        observations, infos = self._robots.observations(), self._robots.infos()
+        ends: dict[str, Any] = {}
+        for i in finished.nonzero()[0]:
+            info = {name: values[i] for name, values in infos.items()}
+            ends = self._add_info(ends, {"final_obs": observations[i], "final_info": info}, int(i))
+        return ends
+
+
+class _Robots:
+    """What both environments share: a `QuadrupedEnv` in numpy, whose episodes others begin."""
+
+    def __init__(self, cfg: QuadrupedEnvCfg) -> None:
+        self.cfg = cfg
+        self._env: QuadrupedEnv | None = None
+        self._held = torch.zeros(cfg.num_envs, dtype=torch.bool)
+        self._held_command = torch.zeros(cfg.num_envs, 4)
+
+    @property
+    def exist(self) -> bool:
+        """Whether the robots were made."""
+        return self._env is not None
+
+    @property
+    def env(self) -> QuadrupedEnv:
+        if self._env is None:
+            raise gymnasium.error.ResetNeeded("call reset before step or render")
+        return self._env
+
+    @property
+    def render_fps(self) -> int:
+        return round(1.0 / self.cfg.step_dt)
+
+    def reset(self, seed: int | None, options: dict[str, Any] | None) -> None:
+        """Begin everywhere; with a seed, robots are made anew, as it decides their physics too."""
+        command, beta = _read_options(options or {}, self.cfg.num_envs)
+        if seed is None:
+            self.env.reset()
+        else:
+            self._env = QuadrupedEnv(replace(self.cfg, seed=seed))
+            self._env.autoreset = False
+        self._held.fill_(command is not None)
+        if command is None and beta is None:
+            return
+        target = self.env.commands.command.clone()
+        if command is not None:
+            target[:, :3] = command
+        if beta is not None:
+            target[:, 3] = beta
+        self._held_command = target
+        self.env.set_command(target)
+
+    def reset_finished(self, finished: np.ndarray) -> None:
+        """Begin the next episode of some robots; a held command ends with its episode."""
+        mask = torch.from_numpy(finished)
+        self._held &= ~mask
+        self.env.reset(mask)
+
+    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return rewards, terminated and truncated. Shapes: (num_envs,)."""
+        shape = (self.cfg.num_envs, NUM_ACTIONS)
+        if actions.shape != shape:
+            raise ValueError(f"actions must have shape {shape}, got {actions.shape}")
+        _, rewards, dones, extras = self.env.step(torch.as_tensor(actions, dtype=torch.float32))
+        self._hold_command()
+        time_outs = extras["time_outs"]
+        return rewards.numpy(), (dones & ~time_outs).numpy(), time_outs.numpy()
+
+    def observations(self) -> np.ndarray:
+        """Return what the robots see. Shape: (num_envs, OBS_DIM)."""
+        # No copy: the environment makes new tensors in every step and reset, here and below.
+        return self.env.get_observations()["policy"].numpy()
+
+    def infos(self) -> dict[str, np.ndarray]:
+        """Return what stands in `info`, with an axis of robots in front."""
+        return {
+            "privileged": self.env.get_observations()["privileged"].numpy(),
+            "landing_speed": self.env.footfalls.landing_speed.numpy(),
+        }
+
+    def _hold_command(self) -> None:
+        """Take back what the environment has drawn in place of a held command."""
+        if not bool(self._held.any()):
+            return
+        drawn = self.env.commands.command
+        wanted = torch.where(self._held.unsqueeze(1), self._held_command, drawn)
+        if not torch.equal(wanted, drawn):
+            self.env.set_command(wanted)
+
+
+class _Camera:
+    """Takes pictures from beside a robot; needs OpenGL from the first one on."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self._size = (height, width)
+        self._renderer: mujoco.Renderer | None = None
+
+    def frame(self, env: QuadrupedEnv, index: int) -> np.ndarray:
+        """Return a picture of one robot, uint8. Shape: (height, width, 3)."""
+        data = mujoco.MjData(env.model)
+        data.qpos[:] = env.simulation.qpos[index].numpy()
+        mujoco.mj_forward(env.model, data)
+        camera = mujoco.MjvCamera()
+        camera.lookat[:] = data.qpos[:3]
+        camera.distance, camera.azimuth, camera.elevation = 1.5, 130.0, -15.0
+        # Every seed compiles its own model, but all look the same.
+        renderer = self._renderer or mujoco.Renderer(env.model, *self._size)
+        self._renderer = renderer
+        renderer.update_scene(data, camera)
+        return renderer.render().copy()
+
+    def close(self) -> None:
+        """Release the OpenGL context."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+def _checked(cfg: QuadrupedEnvCfg | None) -> QuadrupedEnvCfg:
+    """Return the default task for None, and refuse what cannot work here."""
+    if cfg is None:
+        return QuadrupedEnvCfg(rewards=RewardsCfg(phase_source="true"))
+    if cfg.rewards.phase_source != "true":
+        raise ValueError(
+            "env.rewards.phase_source must be 'true' in a Gymnasium environment, where nothing"
+            f" estimates the phase, got {cfg.rewards.phase_source!r}"
+        )
+    return cfg
+
+
+def _check_render_mode(render_mode: str | None, metadata: dict[str, Any]) -> None:
+    if render_mode is not None and render_mode not in metadata["render_modes"]:
+        raise ValueError(
+            f"render_mode must be None or one of {metadata['render_modes']}, got {render_mode!r}"
+        )
+
+
+def _observation_space() -> spaces.Box:
+    return spaces.Box(-np.inf, np.inf, (OBS_DIM,), np.float32)
+
+
+def _action_space(cfg: QuadrupedEnvCfg) -> spaces.Box:
+    return spaces.Box(-cfg.action_clip, cfg.action_clip, (NUM_ACTIONS,), np.float32)
+
+
+def _read_options(
+    options: dict[str, Any], num_envs: int
+) -> tuple[torch.Tensor | None, torch.Tensor | None]:
+    """Return command (num_envs, 3) and beta (num_envs,), None where one is left out."""
+    unknown = sorted(set(options) - set(_OPTIONS))
+    if unknown:
+        raise ValueError(f"options may hold {list(_OPTIONS)}, got {unknown}")
+    command = _option(options, "command", (num_envs, 3))
+    beta = _option(options, "beta", (num_envs,))
+    if beta is not None and not bool(((beta >= 0.0) & (beta <= 1.0)).all()):
+        raise ValueError(f"options['beta'] must lie in [0, 1], got {options['beta']!r}")
+    return command, beta
+
+
+def _option(options: dict[str, Any], name: str, shape: tuple[int, ...]) -> torch.Tensor | None:
+    if options.get(name) is None:
+        return None
+    value = np.asarray(options[name], dtype=np.float32)
+    if value.shape not in (shape, shape[1:]) or not np.isfinite(value).all():
+        raise ValueError(
+            f"options[{name!r}] must be finite and of shape {shape[1:]} or {shape}, got"
+            f" {options[name]!r}"
+        )
+    return torch.from_numpy(np.broadcast_to(value, shape).copy())
+
+
+gymnasium.register(
+    id="MUTE/Go1-v0",
+    entry_point="envs.gym:Go1Env",
+    vector_entry_point="envs.gym:Go1VectorEnv",
+)

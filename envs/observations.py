@@ -1,0 +1,130 @@
+"""What the policy and the critic see, and how it is scaled and noised.
+
+The layouts are data: other code finds a part of a group by its name, never by a number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import torch
+
+__all__ = [
+    "OBSERVATION_WIDTHS",
+    "OBS_DIM",
+    "ObservationsCfg",
+    "noise_amplitude",
+    "policy_observation",
+    "slices",
+]
+
+OBSERVATION_WIDTHS: dict[str, int] = {
+    "base_ang_vel": 3,
+    "projected_gravity": 3,
+    "joint_pos": 12,
+    "joint_vel": 12,
+    "last_action": 12,
+    "command": 4,
+}
+"""Parts of the policy's observation, in order (paper, eq. 7)."""
+
+OBS_DIM = sum(OBSERVATION_WIDTHS.values())
+
+
+@dataclass
+class ObservationsCfg:
+    """Scales and noise of the policy's observation, as in the field's usual Go1 tasks."""
+
+    scales: dict[str, float] = field(
+        default_factory=lambda: {
+            "base_ang_vel": 0.25,
+            "projected_gravity": 1.0,
+            "joint_pos": 1.0,
+            "joint_vel": 0.05,
+            "last_action": 1.0,
+            "command": 1.0,
+        }
+    )
+    """Factor of each part."""
+    noise: dict[str, float] = field(
+        default_factory=lambda: {
+            "base_ang_vel": 0.2,
+            "projected_gravity": 0.05,
+            "joint_pos": 0.01,
+            "joint_vel": 1.5,
+        }
+    )
+    """Half width of the uniform noise on each part, before scaling: rad/s, 1, rad, rad/s."""
+    noise_level: float = 1.0
+    """Factor on all noise; 0 switches it off."""
+
+    def __post_init__(self) -> None:
+        """Check the names.
+
+        Raises:
+            ValueError: If a scale is missing or a part is unknown.
+        """
+        if set(self.scales) != set(OBSERVATION_WIDTHS):
+            raise ValueError(
+                f"observations.scales must name {list(OBSERVATION_WIDTHS)}, got {list(self.scales)}"
+            )
+        unknown = set(self.noise) - set(OBSERVATION_WIDTHS)
+        if unknown:
+            raise ValueError(
+                f"observations.noise must name parts of {list(OBSERVATION_WIDTHS)}, "
+                f"got {sorted(unknown)}"
+            )
+
+
+def slices(widths: dict[str, int]) -> dict[str, slice]:
+    """Return the columns of each part of a group laid out in order."""
+    result, start = {}, 0
+    for name, width in widths.items():
+        result[name] = slice(start, start + width)
+        start += width
+    return result
+
+
+def noise_amplitude(cfg: ObservationsCfg) -> torch.Tensor:
+    """Return the half width of the noise on the scaled observation. Shape: (OBS_DIM,)."""
+    parts = [
+        torch.full((width,), cfg.noise.get(name, 0.0) * cfg.scales[name] * cfg.noise_level)
+        for name, width in OBSERVATION_WIDTHS.items()
+    ]
+    return torch.cat(parts)
+
+
+def policy_observation(
+    scales: dict[str, float],
+    base_ang_vel: torch.Tensor,
+    projected_gravity: torch.Tensor,
+    joint_pos: torch.Tensor,
+    joint_vel: torch.Tensor,
+    last_action: torch.Tensor,
+    command: torch.Tensor,
+) -> torch.Tensor:
+    """Return the scaled observation o_t, without noise (paper, eq. 7).
+
+    Args:
+        scales: Factor of each part.
+        base_ang_vel: Angular velocity in the body frame, rad/s. Shape: (num_envs, 3).
+        projected_gravity: Direction of gravity in the body frame. Shape: (num_envs, 3).
+        joint_pos: Joint positions relative to the stance, rad. Shape: (num_envs, 12).
+        joint_vel: Joint velocities, rad/s. Shape: (num_envs, 12).
+        last_action: Action of the previous step. Shape: (num_envs, 12).
+        command: Commands (v_x, v_y, w_z, beta). Shape: (num_envs, 4).
+
+    Returns:
+        A new tensor. Shape: (num_envs, OBS_DIM).
+    """
+    return torch.cat(
+        (
+            base_ang_vel * scales["base_ang_vel"],
+            projected_gravity * scales["projected_gravity"],
+            joint_pos * scales["joint_pos"],
+            joint_vel * scales["joint_vel"],
+            last_action * scales["last_action"],
+            command * scales["command"],
+        ),
+        dim=1,
+    )

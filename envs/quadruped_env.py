@@ -1,0 +1,497 @@
+"""The step loop: a batch of Go1 robots that walk on command, as an rsl_rl `VecEnv`.
+
+This module orders things: set points, physics, contacts, reward, ends of episodes, resets,
+observations. What a reward or an observation is stands in its own module; learning is elsewhere.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import torch
+from rsl_rl.env import VecEnv
+from tensordict import TensorDict
+
+from envs.commands import CommandSampler, CommandsCfg
+from envs.footfall import FootfallCfg, Footfalls
+from envs.observations import (
+    OBS_DIM,
+    ObservationsCfg,
+    noise_amplitude,
+    policy_observation,
+    slices,
+)
+from envs.randomization import PHYSICS_DIM, RandomizationCfg, randomize_physics
+from envs.rewards import Motion, RewardsCfg, RewardSum
+from envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS, SceneCfg, build_scene, sensor_slice
+from envs.simulation import make_simulation
+from envs.terrain import FlatTerrain, HeightMapCfg, height_map
+
+__all__ = ["NUM_ACTIONS", "QuadrupedEnv", "QuadrupedEnvCfg"]
+
+NUM_ACTIONS = 12
+HEIGHT_OFFSET = 0.30
+"""Height that the critic's height map is centred on, m."""
+HEIGHT_SCALE = 0.1
+"""Difference in height that is 1 in the critic's height map, m."""
+_NUM_LINKS = 14
+"""Collision shapes other than feet: trunk, head, and hip, thigh and shank of each leg."""
+
+
+@dataclass
+class QuadrupedEnvCfg:
+    """The task: everything about the world and nothing about learning."""
+
+    num_envs: int = 1024
+    """Number of robots."""
+    seed: int = 0
+    """Seed of every draw in the environment."""
+    num_threads: int = 0
+    """Threads of the physics engine; 0 takes every logical CPU."""
+    decimation: int = 4
+    """Physics steps a control step; with 5 ms steps, 50 Hz."""
+    episode_length: float = 20.0
+    """Longest episode, s."""
+    action_scale: float = 0.25
+    """Radians of joint offset for an action of 1."""
+    action_clip: float = 10.0
+    """Largest magnitude of an action."""
+    max_tilt: float = 1.0
+    """Angle between trunk and vertical that ends an episode, rad."""
+    initial_joint_noise: float = 0.1
+    """Half width of the uniform offset of each joint at reset, rad."""
+    initial_velocity: float = 0.2
+    """Half width of the trunk's uniform initial velocities, m/s and rad/s."""
+    random_heading: bool = True
+    """Whether robots start in random directions."""
+    scene: SceneCfg = field(default_factory=SceneCfg)
+    """Robot, floor and solver."""
+    footfall: FootfallCfg = field(default_factory=FootfallCfg)
+    """How contacts are debounced and landings measured."""
+    height_map: HeightMapCfg = field(default_factory=HeightMapCfg)
+    """Grid of the height map."""
+    commands: CommandsCfg = field(default_factory=CommandsCfg)
+    """Ranges of the commands."""
+    observations: ObservationsCfg = field(default_factory=ObservationsCfg)
+    """Scales and noise."""
+    rewards: RewardsCfg = field(default_factory=RewardsCfg)
+    """Weights and constants of the reward."""
+    randomization: RandomizationCfg = field(default_factory=RandomizationCfg)
+    """Physics that differs between robots, and pushes."""
+
+    def __post_init__(self) -> None:
+        """Check the fields.
+
+        Raises:
+            ValueError: If one is out of its range.
+        """
+        for name in ("num_envs", "decimation"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"env.{name} must be >= 1, got {getattr(self, name)}")
+        for name in ("episode_length", "action_scale", "action_clip", "max_tilt"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"env.{name} must be > 0, got {getattr(self, name)}")
+
+    @property
+    def step_dt(self) -> float:
+        """Control period, s."""
+        return self.scene.timestep * self.decimation
+
+
+class QuadrupedEnv(VecEnv):
+    """A batch of Go1 robots on the ground.
+
+    One step: set points, `decimation` physics steps, contacts and phase, reward, ends, resets,
+    observations. Foot positions and velocities come from sensors and lag the joints by one physics
+    step (MuJoCo's own order); contacts and foot velocities lag alike, so a landing is consistent.
+
+    Observation groups: `policy` (o_t, noised; shape (num_envs, 46)) and `privileged` (true
+    velocity, heights, contacts, causal phases, physics; see `privileged_slices`). Every step
+    returns new tensors: rsl_rl keeps references.
+    """
+
+    def __init__(self, cfg: QuadrupedEnvCfg) -> None:
+        """Compile the scene, draw the physics of every robot and reset all.
+
+        Raises:
+            ValueError: If the configuration is out of range.
+        """
+        self.cfg: QuadrupedEnvCfg = cfg  # pyright: ignore[reportIncompatibleVariableOverride]
+        self.num_envs = cfg.num_envs
+        self.num_actions = NUM_ACTIONS
+        self.autoreset = True
+        """Whether `step` resets finished robots; without, it returns what they saw last, and the
+        caller resets them with `reset`."""
+        self.step_dt = cfg.step_dt
+        self.max_episode_length = math.ceil(cfg.episode_length / cfg.step_dt)
+        self.generator = torch.Generator().manual_seed(cfg.seed)
+        self.model = build_scene(cfg.scene)
+        self.simulation = make_simulation(self.model, cfg.num_envs, num_threads=cfg.num_threads)
+        self.device = self.simulation.device
+        self.physics = randomize_physics(self.simulation, cfg.randomization, self.generator)
+        """Randomised physics as the critic sees it. Shape: (num_envs, PHYSICS_DIM)."""
+        self._bind_sensors()
+        self.grid = cfg.height_map.grid()
+        """Points of the height map in the heading frame, m. Shape: (num_heights, 2)."""
+        self.terrain = FlatTerrain()
+        self.commands = CommandSampler(cfg.commands, cfg.num_envs, self.generator, self.device)
+        self.footfalls = Footfalls(cfg.footfall, cfg.num_envs, cfg.scene.timestep, cfg.decimation)
+        self.reward_sum = RewardSum(cfg.rewards, cfg.step_dt, cfg.num_envs, self.device)
+        self.stand = torch.tensor(STAND_JOINT_POS)
+        """Joint positions of the stance, rad. Shape: (12,)."""
+        self.privileged_slices = slices(
+            {
+                "base_lin_vel": 3,
+                "heights": self.grid.shape[0],
+                "contact": len(LEGS),
+                "phase": len(LEGS),
+                "physics": PHYSICS_DIM,
+            }
+        )
+        """Columns of each part of the group `privileged`."""
+        self._noise = noise_amplitude(cfg.observations)
+        self._allocate()
+        self._reset(torch.ones(self.num_envs, dtype=torch.bool))
+        self._observe()
+
+    # -- VecEnv ---------------------------------------------------------------------------------
+
+    def get_observations(self) -> TensorDict:
+        """Return the observations of the last step or reset, without side effects."""
+        return self._observations
+
+    def step(
+        self, actions: torch.Tensor
+    ) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
+        """Advance every robot by one control step; with `autoreset`, finished ones begin anew.
+
+        Args:
+            actions: Joint offsets over `action_scale`. Shape: (num_envs, 12).
+
+        Returns:
+            Observations after resets, rewards (num_envs,), dones (num_envs,), and `extras` with
+            `time_outs` (num_envs,) and `log`.
+        """
+        clip = self.cfg.action_clip
+        self.action_before_last, self.last_action = self.last_action, self.action
+        # NaN would pass a clamp and reach the engine.
+        self.action = torch.nan_to_num(actions).clamp(-clip, clip)
+        self._advance()
+        self.step_count += 1
+        self.episode_length_buf += 1
+        self._read_state()
+        reward, shares = self.reward_sum(self._motion(), self.quiet, self.lift)
+        terminated = self._terminated()
+        time_outs = (self.episode_length_buf >= self.max_episode_length) & ~terminated
+        dones = terminated | time_outs
+        # What an unstable simulation did is not the policy's merit or fault.
+        reward = torch.where(self.unstable, 0.0, reward)
+        log = self._log(shares, terminated, time_outs)
+        if self.autoreset and bool(dones.any()):
+            self._reset(dones)
+        self._resample_and_push(dones)
+        self._observe()
+        extras = {"time_outs": time_outs, "log": log}
+        return self._observations, reward, dones, extras
+
+    # -- what others may set or read -------------------------------------------------------------
+
+    @property
+    def quiet(self) -> float:
+        """Curriculum factor in [0, 1] on the phase rewards, from the time trained so far."""
+        return self._ramp(self.cfg.rewards.quiet_ramp)
+
+    @property
+    def lift(self) -> float:
+        """Curriculum factor in [0, 1] on the rewards that hold the feet up."""
+        return self._ramp(self.cfg.rewards.lift_ramp)
+
+    def _ramp(self, bounds: tuple[float, float]) -> float:
+        start, end = bounds
+        elapsed = self.step_count * self.step_dt
+        if elapsed >= end:
+            return 1.0
+        return max(0.0, (elapsed - start) / (end - start))
+
+    def set_estimated_phase(self, phase: torch.Tensor) -> None:
+        """Hand over the phase estimated from o_t, before the step that it shapes the reward of.
+
+        Args:
+            phase: Estimated phase of each foot, in [0, 1]. Shape: (num_envs, 4).
+        """
+        self._estimated_phase = phase
+
+    def set_command(self, command: torch.Tensor) -> None:
+        """Replace the commands of all robots, and what they observe of them, at once.
+
+        Args:
+            command: (v_x, v_y, w_z, beta). Shape: (num_envs, 4) or (4,).
+        """
+        self.commands.command[:] = command
+        self._observe()
+
+    def reset(self, mask: torch.Tensor | None = None) -> TensorDict:
+        """Begin a new episode and return the observations of all robots.
+
+        Args:
+            mask: Robots that begin anew; None for all. Shape: (num_envs,), bool.
+        """
+        self._reset(torch.ones(self.num_envs, dtype=torch.bool) if mask is None else mask)
+        self._observe()
+        return self._observations
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that is needed to continue bit for bit."""
+        state: dict[str, Any] = {name: getattr(self, name).clone() for name in _STATE_TENSORS}
+        state["step_count"] = self.step_count
+        state["unstable_count"] = self.unstable_count
+        state["command"] = self.commands.command.clone()
+        state["generator"] = self.generator.get_state()
+        state["simulation"] = self.simulation.state_dict()
+        state["footfalls"] = self.footfalls.state_dict()
+        state["observations"] = {key: self._observations[key].clone() for key in _GROUPS}
+        return state
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Continue from a `state_dict`.
+
+        Raises:
+            ValueError: If it belongs to another number of robots or another model.
+        """
+        self.simulation.load_state_dict(state["simulation"])
+        for name in _STATE_TENSORS:
+            setattr(self, name, state[name].clone())
+        self.step_count = state["step_count"]
+        self.unstable_count = state["unstable_count"]
+        self.commands.command.copy_(state["command"])
+        self.generator.set_state(state["generator"])
+        self.footfalls.load_state_dict(state["footfalls"])
+        self._read_state()
+        groups = {key: value.clone() for key, value in state["observations"].items()}
+        self._observations = TensorDict(groups, batch_size=[self.num_envs])
+
+    # -- one step, in order ----------------------------------------------------------------------
+
+    def _advance(self) -> None:
+        """Run the physics of one control step and record the feet at every physics step."""
+        simulation = self.simulation
+        torch.add(self.stand, self.action, alpha=self.cfg.action_scale, out=simulation.ctrl)
+        self.footfalls.begin()
+        for _ in range(self.cfg.decimation):
+            simulation.step()
+            self.footfalls.record(self._foot_vel_z, self._foot_contact)
+        self.unstable = simulation.unstable()
+        if bool(self.unstable.any()):
+            # Reset before anything is read, so that no NaN reaches a reward or an average.
+            self.unstable_count += int(self.unstable.sum())
+            simulation.reset(self.unstable, keyframe=self.model.key("stand").id)
+            self.footfalls.reset(self.unstable, self._foot_contact)
+
+    def _read_state(self) -> None:
+        """Derive what rewards and observations share from the engine's state."""
+        qpos, qvel = self.simulation.qpos, self.simulation.qvel
+        w, x, y, z = qpos[:, 3:7].unbind(dim=1)
+        # Rows of the rotation matrix from body to world; columns are the world's axes seen by it.
+        rotation = torch.stack(
+            (
+                1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
+                2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
+                2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
+            ),
+            dim=1,
+        ).view(-1, 3, 3)  # fmt: skip
+        self.base_pos = qpos[:, :3]
+        self.base_lin_vel = (rotation.transpose(1, 2) @ qvel[:, :3, None]).squeeze(2)
+        # MuJoCo gives a free joint's angular velocity in the body frame already.
+        self.base_ang_vel = qvel[:, 3:6]
+        self.projected_gravity = -rotation[:, 2]
+        heading = rotation[:, :2, 0]
+        self.heading = heading / heading.norm(dim=1, keepdim=True).clamp(min=1e-6)
+        self.joint_pos = qpos[:, 7:] - self.stand
+        self.joint_vel = qvel[:, 6:]
+
+    def _motion(self) -> Motion:
+        feet = self.footfalls
+        ground = self.terrain.height(self._foot_pos[:, :, :2])
+        clearance = self._foot_pos[:, :, 2] - FOOT_RADIUS - ground
+        feet.update(clearance)
+        joint_acc = (self.joint_vel - self.last_joint_vel) / self.step_dt
+        self.last_joint_vel = self.joint_vel.clone()
+        torque = self.simulation.actuator_force
+        self.power = (torque * self.joint_vel).abs().sum(dim=1)
+        estimated = self.cfg.rewards.phase_source == "estimated"
+        return Motion(
+            command=self.commands.command,
+            base_lin_vel=self.base_lin_vel,
+            base_ang_vel=self.base_ang_vel,
+            projected_gravity=self.projected_gravity,
+            base_height=self.base_pos[:, 2] - self.terrain.height(self.base_pos[:, :2]),
+            joint_pos=self.joint_pos,
+            joint_vel=self.joint_vel,
+            joint_acc=joint_acc,
+            torque=torque,
+            action=self.action,
+            last_action=self.last_action,
+            action_before_last=self.action_before_last,
+            collisions=(self._link_contact > 0.0).sum(dim=1).float(),
+            phase=self._estimated_phase if estimated else feet.phase,
+            foot_drop_sq=feet.drop_sq,
+            foot_raise_sq=feet.raise_sq,
+            foot_speed_xy=self._foot_vel[:, :, :2].norm(dim=2),
+            foot_height=clearance,
+            contact=feet.contact,
+            touchdown=feet.touchdown,
+            landing_speed=feet.landing_speed,
+            swing_apex=feet.swing_apex,
+        )
+
+    def _terminated(self) -> torch.Tensor:
+        upright = -self.projected_gravity[:, 2]
+        self.fallen = (self._trunk_contact > 0.0).any(dim=1) | (
+            upright < math.cos(self.cfg.max_tilt)
+        )
+        return self.fallen | self.unstable
+
+    def _reset(self, mask: torch.Tensor) -> None:
+        """Begin new episodes for the masked robots; no other robot is touched."""
+        simulation, cfg = self.simulation, self.cfg
+        simulation.reset(mask, keyframe=self.model.key("stand").id)
+        draw = 2.0 * torch.rand(self.num_envs, 19, generator=self.generator) - 1.0
+        column = mask.unsqueeze(1)
+        qpos, qvel = simulation.qpos, simulation.qvel
+        joint_pos = self.stand + cfg.initial_joint_noise * draw[:, :12]
+        qpos[:, 7:] = torch.where(column, joint_pos, qpos[:, 7:])
+        qvel[:, :6] = torch.where(column, cfg.initial_velocity * draw[:, 12:18], qvel[:, :6])
+        if cfg.random_heading:
+            half = 0.5 * math.pi * draw[:, 18]
+            zero = torch.zeros_like(half)
+            heading = torch.stack((half.cos(), zero, zero, half.sin()), dim=1)
+            qpos[:, 3:7] = torch.where(column, heading, qpos[:, 3:7])
+        simulation.ctrl[:] = torch.where(column, self.stand, simulation.ctrl)
+        self._lift_to_ground(mask)
+        self.commands.resample(mask, with_beta=True)
+        self.footfalls.reset(mask, self._foot_contact)
+        for name in ("action", "last_action", "action_before_last", "last_joint_vel"):
+            setattr(self, name, getattr(self, name).masked_fill(column, 0.0))
+        self.episode_length_buf = self.episode_length_buf.masked_fill(mask, 0)
+        self._read_state()
+
+    def _lift_to_ground(self, mask: torch.Tensor) -> None:
+        """Put the lowest foot of each masked robot on the ground: joint noise would bury it."""
+        self.simulation.forward(mask)
+        ground = self.terrain.height(self._foot_pos[:, :, :2])
+        clearance = (self._foot_pos[:, :, 2] - FOOT_RADIUS - ground).amin(dim=1)
+        self.simulation.qpos[:, 2] -= torch.where(mask, clearance, 0.0)
+        self.simulation.forward(mask)
+
+    def _resample_and_push(self, dones: torch.Tensor) -> None:
+        age = self.episode_length_buf
+        interval = max(1, round(self.cfg.commands.resampling_time / self.step_dt))
+        due = (age % interval == 0) & ~dones & (age > 0)
+        if bool(due.any()):
+            self.commands.resample(due, with_beta=False)
+        cfg = self.cfg.randomization
+        if not (cfg.enabled and cfg.push_interval > 0.0):
+            return
+        interval = max(1, round(cfg.push_interval / self.step_dt))
+        due = (age % interval == 0) & (age > 0)
+        if bool(due.any()):
+            push = 2.0 * torch.rand(self.num_envs, 2, generator=self.generator) - 1.0
+            push *= cfg.push_velocity * due.unsqueeze(1)
+            self.simulation.qvel[:, :2] += push
+
+    def _observe(self) -> None:
+        policy = policy_observation(
+            self.cfg.observations.scales,
+            self.base_ang_vel,
+            self.projected_gravity,
+            self.joint_pos,
+            self.joint_vel,
+            self.action,
+            self.commands.command,
+        )
+        if self.cfg.observations.noise_level > 0.0:
+            draw = torch.rand(policy.shape, generator=self.generator)
+            policy += self._noise * (2.0 * draw - 1.0)
+        heights = height_map(self.terrain, self.grid, self.base_pos, self.heading)
+        feet = self.footfalls
+        privileged = torch.cat(
+            (
+                self.base_lin_vel,
+                (heights - HEIGHT_OFFSET) / HEIGHT_SCALE,
+                feet.raw_contact.float(),
+                feet.phase,
+                self.physics,
+            ),
+            dim=1,
+        )
+        self._observations = TensorDict(
+            {"policy": policy, "privileged": privileged}, batch_size=[self.num_envs]
+        )
+
+    def _log(
+        self, shares: dict[str, torch.Tensor], terminated: torch.Tensor, time_outs: torch.Tensor
+    ) -> dict[str, torch.Tensor]:
+        """Return a new dictionary of scalars; what did not happen in this step is left out."""
+        log = {f"Reward/{name}": share for name, share in shares.items()}
+        command = self.commands.command
+        error = (command[:, :2] - self.base_lin_vel[:, :2]).square().sum(dim=1)
+        log["Gait/velocity_error_sq"] = error.mean()
+        log["Gait/power"] = self.power.mean()
+        log["Gait/duty_factor"] = self.footfalls.contact_share.mean()
+        beta = command[:, 3]
+        for name, chosen in (("low_beta", beta < 0.25), ("high_beta", beta > 0.75)):
+            landed = self.footfalls.touchdown & chosen.unsqueeze(1)
+            if bool(landed.any()):
+                log[f"Gait/landing_speed_{name}"] = self.footfalls.landing_speed[landed].mean()
+                log[f"Gait/apex_{name}"] = self.footfalls.swing_apex[landed].mean()
+        finished = terminated | time_outs
+        if bool(finished.any()):
+            log["Episode/fall_rate"] = terminated.sum() / finished.sum()
+        log["Episode/unstable"] = self.unstable.sum().float()
+        log["Curriculum/quiet"] = torch.tensor(self.quiet)
+        log["Curriculum/lift"] = torch.tensor(self.lift)
+        return log
+
+    # -- set-up ----------------------------------------------------------------------------------
+
+    def _bind_sensors(self) -> None:
+        data, feet = self.simulation.sensordata, len(LEGS)
+
+        def view(first: str, count: int) -> torch.Tensor:
+            return data[:, sensor_slice(self.model, first, count)]
+
+        self._foot_pos = view(f"{LEGS[0]}_foot_pos", feet).unflatten(1, (feet, 3))
+        self._foot_vel = view(f"{LEGS[0]}_foot_vel", feet).unflatten(1, (feet, 3))
+        self._foot_vel_z = self._foot_vel[:, :, 2]
+        self._foot_contact = view(f"{LEGS[0]}_foot_contact", feet)
+        self._trunk_contact = view("trunk_contact", 2)
+        self._link_contact = view("trunk_contact", _NUM_LINKS)
+
+    def _allocate(self) -> None:
+        num_envs = self.num_envs
+        zeros = torch.zeros(num_envs, NUM_ACTIONS)
+        self.action, self.last_action, self.action_before_last = zeros, zeros, zeros
+        self.last_joint_vel = zeros
+        self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long)
+        self.unstable = torch.zeros(num_envs, dtype=torch.bool)
+        self.fallen = torch.zeros(num_envs, dtype=torch.bool)
+        self.power = torch.zeros(num_envs)
+        self.step_count = 0
+        self.unstable_count = 0
+        self._estimated_phase = torch.zeros(num_envs, len(LEGS))
+
+
+_STATE_TENSORS = (
+    "action",
+    "last_action",
+    "action_before_last",
+    "last_joint_vel",
+    "episode_length_buf",
+    "_estimated_phase",
+    "physics",
+)
+_GROUPS = ("policy", "privileged")
+assert OBS_DIM == 46

@@ -1,0 +1,67 @@
+"""The ground under the robot: heights where the robot wants to know them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+
+__all__ = ["FlatTerrain", "HeightMapCfg", "height_map"]
+
+
+@dataclass
+class HeightMapCfg:
+    """The grid of points around the robot whose heights make the height map."""
+
+    length: float = 0.9
+    """Extent along the heading, m, centred on the trunk."""
+    width: float = 0.6
+    """Extent across the heading, m."""
+    spacing: float = 0.15
+    """Distance between neighbours, m."""
+
+    def grid(self) -> torch.Tensor:
+        """Return the grid points in the heading frame, m. Shape: (num_points, 2).
+
+        Raises:
+            ValueError: If the spacing is not positive.
+        """
+        if self.spacing <= 0.0:
+            raise ValueError(f"height_map.spacing must be > 0, got {self.spacing}")
+        along = _centred(self.length, self.spacing)
+        across = _centred(self.width, self.spacing)
+        return torch.cartesian_prod(along, across)
+
+
+class FlatTerrain:
+    """An endless plane at height zero."""
+
+    def height(self, points: torch.Tensor) -> torch.Tensor:
+        """Return the ground height at world points, m. Shape: (..., 2) -> (...)."""
+        return torch.zeros_like(points[..., 0])
+
+
+def height_map(
+    terrain: FlatTerrain, grid: torch.Tensor, base_pos: torch.Tensor, heading: torch.Tensor
+) -> torch.Tensor:
+    """Return the trunk's height above the ground at each grid point, m.
+
+    Args:
+        terrain: The ground.
+        grid: Points in the heading frame, m. Shape: (num_points, 2).
+        base_pos: Trunk position in the world, m. Shape: (num_envs, 3).
+        heading: Unit vector of the trunk's x axis in the horizontal plane. Shape: (num_envs, 2).
+
+    Returns:
+        Heights. Shape: (num_envs, num_points).
+    """
+    cos, sin = heading[:, :1], heading[:, 1:]
+    along, across = grid[:, 0], grid[:, 1]
+    offset = torch.stack((cos * along - sin * across, sin * along + cos * across), dim=-1)
+    ground = terrain.height(base_pos[:, None, :2] + offset)
+    return base_pos[:, 2:3] - ground
+
+
+def _centred(extent: float, spacing: float) -> torch.Tensor:
+    half = round(extent / spacing / 2)
+    return torch.arange(-half, half + 1) * spacing

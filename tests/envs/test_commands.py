@@ -1,0 +1,107 @@
+"""Tests of the command sampler."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from envs.commands import CommandSampler, CommandsCfg
+
+RANGES = {
+    "lin_vel_x": (0.5, 1.5),
+    "lin_vel_y": (-0.4, -0.2),
+    "ang_vel_z": (-1.0, 1.0),
+    "beta": (0.25, 0.75),
+}
+
+
+def _make_sampler(num_envs=4, **given):
+    generator = torch.Generator().manual_seed(0)
+    return CommandSampler(CommandsCfg(**given), num_envs, generator, torch.device("cpu"))
+
+
+def _resample_all(sampler, with_beta=True):
+    sampler.resample(torch.ones(len(sampler.command), dtype=torch.bool), with_beta=with_beta)
+
+
+def test_commands_fill_their_ranges_and_stay_within():
+    sampler = _make_sampler(2000, standing_fraction=0.0, **RANGES)
+    _resample_all(sampler)
+    for column, (low, high) in enumerate(RANGES.values()):
+        values, margin = sampler.command[:, column], 0.02 * (high - low)
+        assert low <= values.min() < low + margin
+        assert high - margin < values.max() <= high
+
+
+def test_the_asked_share_of_the_robots_stands():
+    sampler = _make_sampler(4000, standing_fraction=0.3)
+    _resample_all(sampler)
+    # Standard deviation of the share: sqrt(0.3 0.7 / 4000) = 0.007.
+    assert sampler.standing.float().mean().item() == pytest.approx(0.3, abs=0.03)
+
+
+def test_a_standing_robot_has_no_velocity_but_a_beta():
+    sampler = _make_sampler(4, standing_fraction=1.0, **RANGES)
+    _resample_all(sampler)
+    assert sampler.standing.all()
+    assert (sampler.command[:, :3] == 0.0).all()
+    assert (sampler.beta >= 0.25).all()
+
+
+def test_turning_on_the_spot_is_not_standing():
+    sampler = _make_sampler(2)
+    sampler.command[:] = torch.tensor([[0.0, 0.0, 0.1, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    assert sampler.standing.tolist() == [False, True]
+
+
+def test_beta_stays_where_only_velocities_are_drawn():
+    sampler = _make_sampler(4, standing_fraction=0.0)
+    _resample_all(sampler)
+    before = sampler.command.clone()
+    _resample_all(sampler, with_beta=False)
+    assert torch.equal(sampler.beta, before[:, 3])
+    assert (sampler.command[:, :3] != before[:, :3]).all()
+
+
+def test_beta_is_drawn_anew_with_an_episode():
+    sampler = _make_sampler(4)
+    _resample_all(sampler)
+    before = sampler.beta.clone()
+    _resample_all(sampler)
+    assert (sampler.beta != before).all()
+
+
+def test_robots_outside_the_mask_keep_their_command():
+    sampler = _make_sampler(4, standing_fraction=0.0)
+    _resample_all(sampler)
+    before = sampler.command.clone()
+    sampler.resample(torch.tensor([False, True, False, True]), with_beta=True)
+    assert torch.equal(sampler.command[::2], before[::2])
+    assert (sampler.command[1::2] != before[1::2]).all()
+
+
+def test_commands_are_written_in_place():
+    sampler = _make_sampler(4)
+    reference = sampler.command
+    _resample_all(sampler)
+    assert reference is sampler.command
+    assert (reference != 0.0).any()
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("lin_vel_x", (1.0, -1.0)),
+        ("lin_vel_y", (0.1, 0.0)),
+        ("ang_vel_z", (0.1, 0.0)),
+        ("beta", (0.6, 0.5)),
+        ("beta", (-0.1, 0.5)),
+        ("beta", (0.0, 1.1)),
+        ("standing_fraction", 1.5),
+        ("standing_fraction", -0.5),
+        ("resampling_time", 0.0),
+    ],
+)
+def test_a_bad_field_is_refused_by_name(field, value):
+    with pytest.raises(ValueError, match=f"commands.{field}"):
+        CommandsCfg(**{field: value})

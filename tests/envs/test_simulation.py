@@ -1,0 +1,244 @@
+"""Tests of the batch of simulations behind its protocol."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+
+from envs.scene import SceneCfg, build_scene, sensor_slice
+from envs.simulation import BatchSimulation, make_simulation
+
+MODEL = build_scene(SceneCfg())
+LIVE = ("qpos", "qvel", "ctrl", "sensordata", "actuator_force")
+
+
+def _make_standing(num_envs=2):
+    """Make robots that hold the standing pose."""
+    simulation = BatchSimulation(MODEL, num_envs, num_threads=1)
+    simulation.reset(torch.ones(num_envs, dtype=torch.bool))
+    simulation.ctrl[:] = simulation.qpos[:, 7:]
+    return simulation
+
+
+def _tensors(simulation, index):
+    return {name: getattr(simulation, name)[index].clone() for name in LIVE}
+
+
+def _assert_same(left, right):
+    for name in LIVE:
+        assert torch.equal(left[name], right[name]), name
+
+
+def test_tensors_have_the_shapes_of_the_model():
+    simulation = _make_standing(3)
+    shapes = {name: getattr(simulation, name).shape for name in LIVE}
+    widths = (MODEL.nq, MODEL.nv, MODEL.nu, MODEL.nsensordata, MODEL.nu)
+    assert shapes == dict(zip(LIVE, [(3, width) for width in widths], strict=True))
+
+
+@pytest.mark.parametrize("name", ["qpos", "qvel", "sensordata", "actuator_force"])
+def test_a_tensor_that_was_kept_shows_the_next_step(name):
+    simulation = _make_standing()
+    simulation.step()
+    kept = getattr(simulation, name)
+    before = kept.clone()
+    simulation.ctrl += 0.2
+    simulation.step(2)
+    assert not torch.equal(kept, before)
+    assert kept is getattr(simulation, name)
+
+
+def test_a_written_position_moves_the_sensors_of_its_robot_alone():
+    simulation = _make_standing()
+    height = sensor_slice(MODEL, "FR_foot_pos", 1).stop - 1
+    before = simulation.sensordata[:, height].clone()
+    simulation.qpos[1, 2] += 0.5
+    simulation.forward()
+    assert simulation.sensordata[0, height] == before[0]
+    assert simulation.sensordata[1, height].item() == pytest.approx(before[1].item() + 0.5)
+
+
+def test_a_written_velocity_is_integrated():
+    simulation = _make_standing()
+    simulation.qpos[:, 2] += 1.0
+    simulation.qvel[1, 0] = 1.0
+    simulation.step(10)
+    assert simulation.qpos[0, 0].item() == pytest.approx(0.0, abs=2e-3)
+    assert simulation.qpos[1, 0].item() == pytest.approx(10 * 0.005, abs=2e-3)
+
+
+def test_a_written_set_point_pulls_its_joint():
+    simulation = _make_standing()
+    simulation.qpos[:, 2] += 1.0
+    simulation.ctrl[1, 1] += 0.3
+    simulation.step()
+    assert simulation.actuator_force[0, 1].item() == pytest.approx(0.0, abs=1e-4)
+    assert simulation.actuator_force[1, 1].item() == pytest.approx(20.0 * 0.3, rel=1e-3)
+
+
+def test_forward_of_a_mask_leaves_the_others_readings_as_they_are():
+    simulation = _make_standing()
+    before = simulation.sensordata.clone()
+    simulation.qpos[:, 2] += 0.5
+    simulation.forward(torch.tensor([True, False]))
+    assert not torch.equal(simulation.sensordata[0], before[0])
+    assert torch.equal(simulation.sensordata[1], before[1])
+
+
+def test_each_robot_slides_on_its_own_friction():
+    simulation = _make_standing()
+    simulation.field("geom_friction")[0, :, 0] = 0.05
+    simulation.field("geom_friction")[1, :, 0] = 1.0
+    simulation.qvel[:, 1] = 0.5
+    simulation.step(20)
+    slippery, rough = simulation.qpos[:, 1].tolist()
+    # 0.1 s at 0.5 m/s; friction of 0.05 g takes 2.5 mm at most.
+    assert 0.0475 <= slippery <= 0.05
+    assert 0.05 - rough > 5.0 * (0.05 - slippery)
+
+
+def test_each_robot_has_its_own_gains():
+    simulation = _make_standing()
+    simulation.field("actuator_gainprm")[0] = 0.0
+    simulation.field("actuator_biasprm")[0] = 0.0
+    simulation.ctrl += 0.1
+    simulation.step()
+    assert (simulation.actuator_force[0] == 0.0).all()
+    assert (simulation.actuator_force[1] > 1.0).all()
+
+
+def test_a_field_begins_as_the_model_has_it():
+    mass = _make_standing().field("body_mass")
+    expected = torch.from_numpy(MODEL.body_mass).to(mass.dtype).expand_as(mass)
+    assert torch.equal(mass, expected)
+
+
+def test_a_reset_puts_the_masked_robots_to_the_keyframe_and_touches_no_other():
+    simulation, twin = _make_standing(), _make_standing()
+    for each in (simulation, twin):
+        each.ctrl += 0.3
+        each.step(7)
+    keyframe = torch.from_numpy(MODEL.key_qpos[0]).float()
+    simulation.reset(torch.tensor([True, False]))
+    assert torch.equal(simulation.qpos[0], keyframe)
+    assert (simulation.qvel[0] == 0.0).all()
+    _assert_same(_tensors(simulation, 1), _tensors(twin, 1))
+    for each in (simulation, twin):
+        each.step(7)
+    _assert_same(_tensors(simulation, 1), _tensors(twin, 1))
+
+
+def test_readings_are_current_after_a_reset():
+    simulation = _make_standing()
+    expected = simulation.sensordata.clone()
+    simulation.ctrl += 0.3
+    simulation.step(7)
+    simulation.reset(torch.tensor([True, True]))
+    assert torch.equal(simulation.sensordata, expected)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("qvel", 1e6),
+        ("qvel", 300.0),
+        ("qvel", math.nan),
+        ("qvel", math.inf),
+        ("qpos", math.nan),
+        ("qpos", 1e12),
+    ],
+)
+def test_a_simulation_that_blows_up_is_found_and_no_other_is_touched(
+    name, value, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log of warnings into the working directory
+    simulation, twin = _make_standing(3), _make_standing(3)
+    getattr(simulation, name)[1, 1] = value
+    simulation.step()
+    twin.step()
+    assert simulation.unstable().tolist() == [False, True, False]
+    simulation.reset(simulation.unstable())
+    assert not simulation.unstable().any()
+    simulation.ctrl[1] = twin.ctrl[1]
+    for each in (simulation, twin):
+        each.step(5)
+    for index in (0, 2):
+        _assert_same(_tensors(simulation, index), _tensors(twin, index))
+    assert not simulation.unstable().any()
+    assert all(value.isfinite().all() for value in _tensors(simulation, 1).values())
+
+
+def test_a_simulation_stays_unstable_until_it_is_reset(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    simulation = _make_standing()
+    simulation.qpos[0, 0] = math.nan
+    simulation.step()
+    # MuJoCo has put it to its initial state by now and goes on as if nothing had been.
+    simulation.step(3)
+    assert simulation.qpos.isfinite().all()
+    assert simulation.unstable().tolist() == [True, False]
+
+
+class _BatchThatRaises:
+    """Steps all simulations but the first, then raises, as the engine does on its own errors."""
+
+    def __init__(self, batch):
+        self._batch = batch
+
+    def __getattr__(self, name):
+        return getattr(self._batch, name)
+
+    def step(self, nstep):
+        ids = torch.ones(self._batch.num_sims, dtype=torch.bool)
+        ids[0] = False
+        self._batch.step(ids.numpy(), nstep=nstep)
+        raise RuntimeError("arena exhausted")
+
+
+def test_an_engine_error_is_an_unstable_simulation_and_stops_nothing(monkeypatch):
+    simulation, twin = _make_standing(), _make_standing()
+    monkeypatch.setattr(simulation, "_batch", _BatchThatRaises(simulation._batch))
+    simulation.step()
+    twin.step()
+    assert simulation.unstable().tolist() == [True, False]
+    _assert_same(_tensors(simulation, 1), _tensors(twin, 1))
+    simulation.reset(torch.tensor([True, False]))
+    assert not simulation.unstable().any()
+
+
+def test_a_loaded_state_continues_bit_for_bit():
+    simulation = _make_standing()
+    simulation.field("geom_friction")[1, :, 0] = 0.3
+    simulation.field("body_mass")[0, 1] += 1.0
+    simulation.set_const()
+    simulation.ctrl += 0.2
+    simulation.step(9)
+    state = simulation.state_dict()
+    simulation.step(9)
+    twin = _make_standing()
+    twin.load_state_dict(state)
+    twin.step(9)
+    for index in range(2):
+        _assert_same(_tensors(twin, index), _tensors(simulation, index))
+
+
+def test_a_saved_state_does_not_change_afterwards():
+    simulation = _make_standing()
+    simulation.field("body_mass")
+    state = simulation.state_dict()
+    kept = {name: value.clone() for name, value in state.items()}
+    simulation.field("body_mass")[:] *= 2.0
+    simulation.step(3)
+    assert all(torch.equal(state[name], value) for name, value in kept.items())
+
+
+def test_a_state_of_another_number_of_robots_is_refused():
+    with pytest.raises(ValueError, match="num_envs"):
+        _make_standing(3).load_state_dict(_make_standing(2).state_dict())
+
+
+def test_a_device_without_engine_is_refused():
+    with pytest.raises(ValueError, match="cuda"):
+        make_simulation(MODEL, 2, device="cuda")

@@ -1,0 +1,68 @@
+"""Tests of the ground and of the height map."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+
+from envs.terrain import FlatTerrain, HeightMapCfg, height_map
+
+
+class _Slope(FlatTerrain):
+    """Ground as high as the world's x, plus a hundred times its y."""
+
+    def height(self, points):
+        return points[..., 0] + 100.0 * points[..., 1]
+
+
+def _heading(*angles):
+    return torch.tensor([[math.cos(angle), math.sin(angle)] for angle in angles])
+
+
+def test_the_default_grid_spans_90_by_60_centimetres_around_the_trunk():
+    grid = HeightMapCfg().grid()
+    assert grid.shape == (35, 2)
+    torch.testing.assert_close(grid.mean(dim=0), torch.zeros(2))
+    torch.testing.assert_close(grid.amax(dim=0), torch.tensor([0.45, 0.30]))
+    torch.testing.assert_close(grid.amin(dim=0), torch.tensor([-0.45, -0.30]))
+
+
+def test_the_grid_runs_across_first_and_then_along():
+    grid = HeightMapCfg(length=0.4, width=0.8, spacing=0.2).grid()
+    expected = [[x, y] for x in (-0.2, 0.0, 0.2) for y in (-0.4, -0.2, 0.0, 0.2, 0.4)]
+    torch.testing.assert_close(grid, torch.tensor(expected))
+
+
+def test_a_grid_without_spacing_is_refused():
+    with pytest.raises(ValueError, match=r"height_map.spacing"):
+        HeightMapCfg(spacing=0.0).grid()
+
+
+def test_flat_ground_is_at_zero_everywhere():
+    points = torch.tensor([[[3.0, -4.0], [0.0, 0.0]]])
+    assert torch.equal(FlatTerrain().height(points), torch.zeros(1, 2))
+
+
+def test_over_flat_ground_every_height_is_the_trunks():
+    base_pos = torch.tensor([[5.0, 1.0, 0.31], [0.0, 0.0, 0.2]])
+    heights = height_map(FlatTerrain(), HeightMapCfg().grid(), base_pos, _heading(0.3, 2.0))
+    torch.testing.assert_close(heights, torch.tensor([[0.31], [0.2]]).expand(2, 35))
+
+
+@pytest.mark.parametrize(
+    ("yaw", "world"),
+    [
+        (0.0, (0.4, 0.1)),
+        (math.pi / 2, (-0.1, 0.4)),  # ahead is +y, left is -x
+        (math.pi, (-0.4, -0.1)),
+        (-math.pi / 2, (0.1, -0.4)),
+    ],
+)
+def test_the_grid_turns_with_the_heading(yaw, world):
+    ahead_and_left = torch.tensor([[0.4, 0.1]])
+    base_pos = torch.tensor([[2.0, 3.0, 0.3]])
+    heights = height_map(_Slope(), ahead_and_left, base_pos, _heading(yaw))
+    ground = (2.0 + world[0]) + 100.0 * (3.0 + world[1])
+    torch.testing.assert_close(heights, torch.tensor([[0.3 - ground]]))
