@@ -1,0 +1,239 @@
+"""The estimator: from the history of observations to what the robot cannot measure.
+
+An LSTM turns the proprioceptive history into body velocity, terrain heights, a latent and the phase
+of each foot. This module is the network alone; its labels, losses and optimiser are left to others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+State = tuple[Tensor, Tensor]
+"""Hidden and cell state of the LSTM, each of shape (N, lstm_hidden)."""
+
+_ACTIVATIONS: dict[str, type[nn.Module]] = {"elu": nn.ELU, "relu": nn.ReLU, "tanh": nn.Tanh}
+_LOG_VAR_RANGE = (-10.0, 5.0)
+
+
+@dataclass
+class EstimatorCfg:
+    """Sizes and scales of the estimator."""
+
+    lstm_hidden: int = 128
+    """Width of the LSTM's hidden state."""
+
+    latent_dim: int = 16
+    """Size of the latent z."""
+
+    decoder_hidden: tuple[int, ...] = (64,)
+    """Widths of the hidden layers of the decoder that predicts the next observation."""
+
+    phase_hidden: tuple[int, ...] = (64,)
+    """Widths of the hidden layers of the phase network."""
+
+    height_offset: float = 0.30
+    """Height of the trunk above the ground for which the height head gives 0, in m."""
+
+    height_scale: float = 0.1
+    """Difference in height for which the height head gives 1, in m."""
+
+    activation: Literal["elu", "relu", "tanh"] = "elu"
+    """Activation of the decoder and of the phase network."""
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            ValueError: If a size or the height scale is not positive, or the activation is unknown.
+        """
+        sizes = {"lstm_hidden": (self.lstm_hidden,), "latent_dim": (self.latent_dim,)}
+        sizes |= {"decoder_hidden": self.decoder_hidden, "phase_hidden": self.phase_hidden}
+        for name, widths in sizes.items():
+            if any(width < 1 for width in widths):
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if not self.height_scale > 0.0:
+            raise ValueError(f"height_scale must be positive, got {self.height_scale}")
+        if self.activation not in _ACTIVATIONS:
+            raise ValueError(
+                f"activation must be one of {list(_ACTIVATIONS)}, got {self.activation!r}"
+            )
+
+
+class Estimate(NamedTuple):
+    """What the estimator says of one step, shapes (N, .), or of a sequence, shapes (T, N, .)."""
+
+    base_lin_vel: Tensor
+    """Linear velocity of the base, in the frame of its label, in m/s. Last dimension: 3."""
+
+    heights: Tensor
+    """Height of the trunk above each point of the grid, in m. Last dimension: num_heights."""
+
+    latent_mean: Tensor
+    """Mean of the latent. Last dimension: latent_dim."""
+
+    latent_log_var: Tensor
+    """Logarithm of the variance of the latent, within [-10, 5]. Last dimension: latent_dim."""
+
+    latent: Tensor
+    """The latent in use: its mean, or a sample in training. Last dimension: latent_dim."""
+
+    phase: Tensor
+    """Phase of each foot, within [0, 1]. Last dimension: num_feet."""
+
+
+class Estimator(nn.Module):
+    """LSTM encoder with heads for velocity, heights and a latent, a decoder and a phase network.
+
+    The heads read the LSTM's hidden state. The decoder predicts the next observation from the
+    latent alone; the phase network is fed by the estimated heights (normalised), velocity and
+    latent, and its gradient flows through them into the encoder, so that all losses shape it.
+    Acting uses the mean of the latent, never a sample: a stored rollout that is unrolled again
+    gives the same estimates.
+
+    Source: MUTE, section "Phase Estimation".
+    """
+
+    def __init__(
+        self, obs_dim: int, num_heights: int, cfg: EstimatorCfg | None = None, num_feet: int = 4
+    ) -> None:
+        """Build the networks.
+
+        Args:
+            obs_dim: Size of an observation.
+            num_heights: Number of points of the height map.
+            cfg: Sizes and scales; the defaults if left out.
+            num_feet: Number of feet.
+        """
+        super().__init__()
+        self.cfg = cfg = cfg if cfg is not None else EstimatorCfg()
+        # LSTMCell holds the weights; its equations are written out below, so that `unroll` can
+        # multiply the observations of all steps at once.
+        self.lstm = nn.LSTMCell(obs_dim, cfg.lstm_hidden)
+        self.base_lin_vel_head = nn.Linear(cfg.lstm_hidden, 3)
+        self.heights_head = nn.Linear(cfg.lstm_hidden, num_heights)
+        self.latent_mean_head = nn.Linear(cfg.lstm_hidden, cfg.latent_dim)
+        self.latent_log_var_head = nn.Linear(cfg.lstm_hidden, cfg.latent_dim)
+        activation = _ACTIVATIONS[cfg.activation]
+        self.decoder = _mlp(cfg.latent_dim, cfg.decoder_hidden, obs_dim, activation)
+        phase_inputs = num_heights + 3 + cfg.latent_dim
+        self.phase_network = _mlp(phase_inputs, cfg.phase_hidden, num_feet, activation)
+
+    def initial_state(self, num_envs: int, device: torch.device | str | None = None) -> State:
+        """Return the zero state; it lies with the weights unless another device is given."""
+        weight = self.lstm.weight_hh
+        shape = (num_envs, self.cfg.lstm_hidden)
+        device = weight.device if device is None else device
+        return (
+            torch.zeros(shape, dtype=weight.dtype, device=device),
+            torch.zeros(shape, dtype=weight.dtype, device=device),
+        )
+
+    def step(self, obs: Tensor, state: State) -> tuple[Estimate, State]:
+        """Consume one observation and return the estimate and the new state, both out of place.
+
+        The latent is its mean. The caller zeroes the state of an environment before its first
+        observation.
+
+        Args:
+            obs: Observations. Shape: (N, obs_dim).
+            state: Hidden and cell state. Shapes: (N, lstm_hidden).
+        """
+        state = _lstm_step(self._project(obs), state, self.lstm.weight_hh)
+        return self._heads(state[0]), state
+
+    def unroll(
+        self,
+        obs: Tensor,
+        state: State,
+        starts: Tensor,
+        sample: bool = False,
+        generator: torch.Generator | None = None,
+    ) -> tuple[Estimate, State]:
+        """Consume a sequence of observations, as `step` would one after the other.
+
+        Args:
+            obs: Observations. Shape: (T, N, obs_dim).
+            state: Hidden and cell state before the first observation. Shapes: (N, lstm_hidden).
+            starts: True where an episode begins: the state is zeroed before that observation is
+                consumed.
+                Shape: (T, N), bool.
+            sample: Whether the latent is sampled (reparameterised, for training) or its mean.
+            generator: Source of the samples.
+
+        Returns:
+            The estimates, shapes (T, N, .), and the state after the last observation.
+
+        Raises:
+            ValueError: If `starts` does not match the observations or is not boolean.
+        """
+        if starts.shape != obs.shape[:2] or starts.dtype != torch.bool:
+            raise ValueError(
+                f"starts must be a bool tensor of shape {tuple(obs.shape[:2])}, "
+                f"got {starts.dtype} of shape {tuple(starts.shape)}"
+            )
+        hidden = []
+        for projected, start in zip(
+            self._project(obs).unbind(0), starts[..., None].unbind(0), strict=True
+        ):
+            kept = (state[0].masked_fill(start, 0.0), state[1].masked_fill(start, 0.0))
+            state = _lstm_step(projected, kept, self.lstm.weight_hh)
+            hidden.append(state[0])
+        return self._heads(torch.stack(hidden), sample, generator), state
+
+    def decode(self, latent: Tensor) -> Tensor:
+        """Predict the next observation from the latent: (., latent_dim) to (., obs_dim)."""
+        return self.decoder(latent)
+
+    def _project(self, obs: Tensor) -> Tensor:
+        """Return what the observation adds to the gates. Shape: (., 4 * lstm_hidden)."""
+        return functional.linear(obs, self.lstm.weight_ih, self.lstm.bias_ih + self.lstm.bias_hh)
+
+    def _heads(
+        self, hidden: Tensor, sample: bool = False, generator: torch.Generator | None = None
+    ) -> Estimate:
+        """Turn hidden states, shape (., lstm_hidden), into an estimate."""
+        base_lin_vel = self.base_lin_vel_head(hidden)
+        heights = self.heights_head(hidden)
+        mean = self.latent_mean_head(hidden)
+        log_var = self.latent_log_var_head(hidden).clamp(*_LOG_VAR_RANGE)
+        latent = _sample(mean, log_var, generator) if sample else mean
+        phase = torch.sigmoid(
+            self.phase_network(torch.cat((heights, base_lin_vel, latent), dim=-1))
+        )
+        metres = self.cfg.height_offset + self.cfg.height_scale * heights
+        return Estimate(base_lin_vel, metres, mean, log_var, latent, phase)
+
+
+def _lstm_step(projected: Tensor, state: State, weight_hh: Tensor) -> State:
+    """Advance an LSTM by one step, with the gates in torch's order i, f, g, o.
+
+    Source: Hochreiter and Schmidhuber, 1997; Gers et al., 2000 (forget gate).
+    """
+    hidden, cell = state
+    gates = torch.addmm(projected, hidden, weight_hh.t())
+    input_gate, forget_gate, candidate, output_gate = gates.chunk(4, dim=-1)
+    cell = torch.sigmoid(forget_gate) * cell + torch.sigmoid(input_gate) * torch.tanh(candidate)
+    return torch.sigmoid(output_gate) * torch.tanh(cell), cell
+
+
+def _sample(mean: Tensor, log_var: Tensor, generator: torch.Generator | None) -> Tensor:
+    """Draw a reparameterised sample of a diagonal Gaussian (Kingma and Welling, 2014)."""
+    noise = torch.randn(mean.shape, generator=generator, dtype=mean.dtype, device=mean.device)
+    return mean + torch.exp(0.5 * log_var) * noise
+
+
+def _mlp(
+    in_features: int, hidden: Sequence[int], out_features: int, activation: type[nn.Module]
+) -> nn.Sequential:
+    """Build a perceptron with the given hidden layers and a linear output."""
+    layers: list[nn.Module] = []
+    for width in hidden:
+        layers += [nn.Linear(in_features, width), activation()]
+        in_features = width
+    return nn.Sequential(*layers, nn.Linear(in_features, out_features))
