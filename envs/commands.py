@@ -28,6 +28,11 @@ class CommandsCfg:
     """Share of the velocity commands that are zero."""
     resampling_time: float = 10.0
     """Time between new velocity commands within an episode, s."""
+    initial_share: float = 1.0
+    """Share of the velocity ranges that commands are drawn from at the start of a training: far
+    from the command the tracking reward is flat, so fast commands teach a standing robot nothing."""
+    ramp: tuple[float, float] = (0.0, 0.0)
+    """Seconds of simulated time per environment between which that share grows to 1."""
 
     def __post_init__(self) -> None:
         """Check the ranges.
@@ -46,6 +51,12 @@ class CommandsCfg:
         if not 0.0 <= self.standing_fraction <= 1.0:
             raise ValueError(
                 f"commands.standing_fraction must be in [0, 1], got {self.standing_fraction}"
+            )
+        if not 0.0 <= self.initial_share <= 1.0:
+            raise ValueError(f"commands.initial_share must be in [0, 1], got {self.initial_share}")
+        if not 0.0 <= self.ramp[0] <= self.ramp[1]:
+            raise ValueError(
+                f"commands.ramp must be (start, end) with 0 <= start <= end, got {self.ramp}"
             )
         if self.resampling_time <= 0.0:
             raise ValueError(f"commands.resampling_time must be > 0, got {self.resampling_time}")
@@ -76,16 +87,18 @@ class CommandSampler:
         """Which environments are asked to stand still. Shape: (num_envs,)."""
         return (self.command[:, :BETA] == 0.0).all(dim=1)
 
-    def resample(self, mask: torch.Tensor, with_beta: bool) -> None:
+    def resample(self, mask: torch.Tensor, with_beta: bool, progress: float = 1.0) -> None:
         """Draw new velocity commands for the masked environments, in place.
 
         Args:
             mask: Which environments get a new command. Shape: (num_envs,).
             with_beta: Whether beta is drawn too, as it is at the start of an episode.
+            progress: How far the ranges have grown, from 0 (the initial share) to 1 (all).
         """
         draw = torch.rand(self.command.shape[0], 5, generator=self.generator, device=mask.device)
         fresh = self._low + self._span * draw[:, :4]
         standing = draw[:, 4] < self.cfg.standing_fraction
+        fresh[:, :BETA] *= self.cfg.initial_share + (1.0 - self.cfg.initial_share) * progress
         fresh[:, :BETA].masked_fill_(standing.unsqueeze(1), 0.0)
         if not with_beta:
             fresh[:, BETA] = self.command[:, BETA]

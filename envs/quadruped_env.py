@@ -371,7 +371,7 @@ class QuadrupedEnv(VecEnv):
             qpos[:, 3:7] = torch.where(column, heading, qpos[:, 3:7])
         simulation.ctrl[:] = torch.where(column, self.stand, simulation.ctrl)
         self._lift_to_ground(mask)
-        self.commands.resample(mask, with_beta=True)
+        self.commands.resample(mask, True, self._ramp(self.cfg.commands.ramp))
         self.footfalls.reset(mask, self._foot_contact)
         for name in ("action", "last_action", "action_before_last", "last_joint_vel"):
             setattr(self, name, getattr(self, name).masked_fill(column, 0.0))
@@ -391,7 +391,7 @@ class QuadrupedEnv(VecEnv):
         interval = max(1, round(self.cfg.commands.resampling_time / self.step_dt))
         due = (age % interval == 0) & ~dones & (age > 0)
         if bool(due.any()):
-            self.commands.resample(due, with_beta=False)
+            self.commands.resample(due, False, self._ramp(self.cfg.commands.ramp))
         cfg = self.cfg.randomization
         if not (cfg.enabled and cfg.push_interval > 0.0):
             return
@@ -453,6 +453,7 @@ class QuadrupedEnv(VecEnv):
         log["Episode/unstable"] = self.unstable.sum().float()
         log["Curriculum/quiet"] = torch.tensor(self.quiet)
         log["Curriculum/lift"] = torch.tensor(self.lift)
+        log["Curriculum/commands"] = torch.tensor(self._ramp(self.cfg.commands.ramp))
         return log
 
     # -- set-up ----------------------------------------------------------------------------------
