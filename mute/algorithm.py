@@ -1,0 +1,86 @@
+"""rsl_rl's PPO with the estimator beside it: learnt, saved and moved together, never mixed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from rsl_rl.algorithms import PPO
+from tensordict import TensorDict
+
+from mute.estimated_env import EstimatedEnv
+from mute.estimation import EstimatorTrainer
+from mute.threads import use_collection_threads, use_learning_threads
+from networks.estimator import State
+
+__all__ = ["EstimatorPPO"]
+
+
+class EstimatorPPO(PPO):
+    """PPO whose update first trains the estimator on the stored rollout.
+
+    The actor and the critic read the estimates as they were stored, so the probability ratio is 1
+    on the first mini-batch, and no gradient of theirs reaches the estimator.
+    """
+
+    env: EstimatedEnv
+    """Where the estimator runs."""
+    trainer: EstimatorTrainer
+    """What the estimator learns by."""
+
+    def attach(self, env: EstimatedEnv, trainer: EstimatorTrainer) -> None:
+        """Take on the estimator; to be called once, before anything else.
+
+        A live module cannot come through rsl_rl's configuration, which is deep-copied.
+        """
+        self.env, self.trainer = env, trainer
+        self._rollout_state: State = env.state_before
+
+    def act(self, obs: TensorDict) -> torch.Tensor:
+        """Sample actions, see `PPO.act`; remember the LSTM state that the rollout began with."""
+        if self.storage.step == 0:
+            self._rollout_state = self.env.state_before
+            use_collection_threads()
+        return super().act(obs)
+
+    def update(self) -> dict[str, float]:
+        """Train the estimator, then actor and critic; return the mean losses and errors."""
+        use_learning_threads()
+        # Clones made outside inference mode are ordinary tensors, which autograd accepts.
+        hidden, cell = self._rollout_state
+        losses = self.trainer.update(
+            self.storage, (hidden.clone(), cell.clone()), self.gpu_world_size
+        )
+        losses |= super().update()
+        self.env.refresh()
+        return losses
+
+    def train_mode(self) -> None:
+        """Set train mode for all networks."""
+        super().train_mode()
+        self.trainer.estimator.train()
+
+    def eval_mode(self) -> None:
+        """Set evaluation mode for all networks."""
+        super().eval_mode()
+        self.trainer.estimator.eval()
+
+    def save(self) -> dict[str, Any]:
+        """Return the state of all networks and both optimisers."""
+        return super().save() | {
+            "estimator_state_dict": self.trainer.estimator.state_dict(),
+            "estimator_trainer": self.trainer.state_dict(),
+        }
+
+    def load(self, loaded_dict: dict, load_cfg: dict | None, strict: bool) -> bool:
+        """Load what `save` returned, see `PPO.load`."""
+        self.trainer.estimator.load_state_dict(loaded_dict["estimator_state_dict"], strict=strict)
+        if load_cfg is None or load_cfg.get("optimizer"):
+            self.trainer.load_state_dict(loaded_dict["estimator_trainer"])
+        return super().load(loaded_dict, load_cfg, strict)
+
+    def broadcast_parameters(self) -> None:
+        """Give every process the parameters of the first."""
+        super().broadcast_parameters()
+        for tensor in self.trainer.estimator.state_dict().values():
+            torch.distributed.broadcast(tensor, src=0)

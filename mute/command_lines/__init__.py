@@ -1,0 +1,1 @@
+"""The command lines behind the scripts at the top of the repository."""

@@ -1,0 +1,239 @@
+"""How a task is learnt: the agent's configuration, and configurations to and from plain data."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+import cattrs
+
+from envs.quadruped_env import QuadrupedEnvCfg
+from networks.estimator import EstimatorCfg
+
+__all__ = ["AgentCfg", "EstimationCfg", "PPOCfg", "TaskCfg", "from_plain", "to_plain"]
+
+
+@dataclass
+class EstimationCfg:
+    """Training of the estimator (paper, section II-B)."""
+
+    network: EstimatorCfg = field(default_factory=EstimatorCfg)
+    """Sizes of the estimator."""
+    learning_rate: float = 1.0e-3
+    """Learning rate of the estimator's own Adam."""
+    lambda_fwd: float = 1.0
+    """Weight of the forward model's loss."""
+    lambda_phase: float = 1.0
+    """Weight of the phase loss."""
+    lambda_kl: float = 1.0e-3
+    """Weight of the KL divergence inside the forward model's loss."""
+    num_mini_batches: int = 4
+    """Parts that the environments are split into; each makes one step of the optimiser."""
+    max_grad_norm: float = 1.0
+    """Bound on the gradient's norm."""
+    actor_uses_phase: bool = True
+    """Whether the group `estimate` holds the phase; False is the paper's exact actor."""
+
+    def __post_init__(self) -> None:
+        """Check the fields.
+
+        Raises:
+            ValueError: If one is out of its range.
+        """
+        _check_from(1, self, "agent.estimation", "num_mini_batches")
+        _check_positive(self, "agent.estimation", "learning_rate", "max_grad_norm")
+        _check_from(0, self, "agent.estimation", "lambda_fwd", "lambda_phase", "lambda_kl")
+
+
+@dataclass
+class PPOCfg:
+    """Settings of rsl_rl's PPO; the field's for the Go1, and the paper's Adam at 1e-3."""
+
+    num_learning_epochs: int = 5
+    """Passes over a rollout."""
+    num_mini_batches: int = 4
+    """Parts of a rollout."""
+    clip_param: float = 0.2
+    """Clipping range of the probability ratio and of the value."""
+    gamma: float = 0.99
+    """Discount."""
+    lam: float = 0.95
+    """Lambda of the generalised advantage estimate."""
+    value_loss_coef: float = 1.0
+    """Weight of the value loss."""
+    entropy_coef: float = 0.01
+    """Weight of the entropy bonus."""
+    learning_rate: float = 1.0e-3
+    """Adam's learning rate, at the start where the schedule adapts it."""
+    schedule: Literal["adaptive", "fixed"] = "adaptive"
+    """Whether the learning rate follows the KL divergence."""
+    desired_kl: float = 0.01
+    """KL divergence that the adaptive schedule aims at."""
+    max_grad_norm: float = 1.0
+    """Bound on the gradients' norms."""
+    use_clipped_value_loss: bool = True
+    """Whether the value loss is clipped."""
+
+    def __post_init__(self) -> None:
+        """Check the fields.
+
+        Raises:
+            ValueError: If one is out of its range.
+        """
+        _check_from(1, self, "agent.ppo", "num_learning_epochs", "num_mini_batches")
+        _check_from(0, self, "agent.ppo", "value_loss_coef", "entropy_coef")
+        names = ("clip_param", "learning_rate", "desired_kl", "max_grad_norm")
+        _check_positive(self, "agent.ppo", *names)
+        for name in ("gamma", "lam"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"agent.ppo.{name} must be in [0, 1], got {getattr(self, name)}")
+
+
+@dataclass
+class AgentCfg:
+    """Networks, PPO and estimator, and how long they learn."""
+
+    iterations: int = 800
+    """Number of rollouts and updates."""
+    num_steps_per_env: int = 24
+    """Control steps of a rollout."""
+    save_interval: int = 50
+    """Iterations between checkpoints."""
+    actor_hidden: tuple[int, ...] = (256, 128, 64)
+    """Widths of the actor's hidden layers."""
+    critic_hidden: tuple[int, ...] = (256, 128, 64)
+    """Widths of the critic's hidden layers."""
+    activation: Literal["elu", "relu", "selu", "tanh"] = "elu"
+    """Activation of actor and critic."""
+    init_std: float = 1.0
+    """Standard deviation of the actions at the start."""
+    std_range: tuple[float, float] = (0.05, 1.2)
+    """Bounds on it; unbounded, the entropy bonus can blow it up."""
+    matmul_precision: Literal["highest", "high", "medium"] = "medium"
+    """torch's float32 matrix products, everywhere in a run: 'medium' lets processors that have
+    bfloat16 units use them."""
+    ppo: PPOCfg = field(default_factory=PPOCfg)
+    """The algorithm."""
+    estimation: EstimationCfg = field(default_factory=EstimationCfg)
+    """The estimator."""
+
+    def __post_init__(self) -> None:
+        """Check the fields.
+
+        Raises:
+            ValueError: If one is out of its range.
+        """
+        _check_from(1, self, "agent", "iterations", "num_steps_per_env", "save_interval")
+        _check_positive(self, "agent", "init_std")
+        for name in ("actor_hidden", "critic_hidden"):
+            widths = getattr(self, name)
+            if not widths or min(widths) < 1:
+                raise ValueError(f"agent.{name} must be widths >= 1, got {widths}")
+        low, high = self.std_range
+        if not 0.0 < low <= high:
+            raise ValueError(
+                f"agent.std_range must be (low, high) with 0 < low <= high, got {self.std_range}"
+            )
+
+    def rsl_rl(self) -> dict[str, Any]:
+        """Return the configuration that rsl_rl's runner takes."""
+        network = {
+            "class_name": "MLPModel",
+            "activation": self.activation,
+            "obs_normalization": True,
+        }
+        distribution = {
+            "class_name": "GaussianDistribution",
+            "init_std": self.init_std,
+            "std_range": self.std_range,
+        }
+        return {
+            "num_steps_per_env": self.num_steps_per_env,
+            "save_interval": self.save_interval,
+            "obs_groups": {
+                "actor": ["policy", "estimate"],
+                "critic": ["policy", "estimate", "privileged"],
+            },
+            "actor": network | {"hidden_dims": self.actor_hidden, "distribution_cfg": distribution},
+            "critic": network | {"hidden_dims": self.critic_hidden},
+            "algorithm": {"class_name": "mute.algorithm:EstimatorPPO"} | asdict(self.ppo),
+            "logger": {"class_name": "mute.logger:CurveWriter"},
+        }
+
+
+@dataclass
+class TaskCfg:
+    """A task: its environment and the agent that learns it."""
+
+    env: QuadrupedEnvCfg = field(default_factory=QuadrupedEnvCfg)
+    """The robot and its world."""
+    agent: AgentCfg = field(default_factory=AgentCfg)
+    """Learning."""
+
+    def __post_init__(self) -> None:
+        """Check what the environment leaves to torch.
+
+        Raises:
+            ValueError: If the seed is none that torch takes.
+        """
+        if not 0 <= self.env.seed < 2**63:
+            raise ValueError(f"env.seed must be in [0, 2^63), got {self.env.seed}")
+
+
+def to_plain(cfg: TaskCfg) -> dict[str, Any]:
+    """Return a configuration as dictionaries, lists, strings and numbers."""
+    return _listed(asdict(cfg))
+
+
+def from_plain(data: dict[str, Any] | None) -> TaskCfg:
+    """Make a configuration from what `to_plain` returned.
+
+    Raises:
+        ValueError: If a field is missing where it must not be, unknown, or out of its range.
+    """
+    if not isinstance(data, dict):
+        raise ValueError(f"configuration must be a dictionary, got {type(data).__name__}")
+    try:
+        return _converter.structure(data, TaskCfg)
+    except cattrs.BaseValidationError as error:
+        reasons = "; ".join(cattrs.transform_error(error, format_exception=_reason))
+        raise ValueError(f"configuration does not fit this version: {reasons}") from error
+
+
+def _exactly(value: Any, expected: type) -> Any:  # noqa: ANN401
+    """Refuse what `int` and `bool` would turn into another value: 2.7, or "False"."""
+    if type(value) is not expected:
+        raise ValueError(f"expected {expected.__name__}, got {value!r}")
+    return value
+
+
+_converter = cattrs.Converter(forbid_extra_keys=True)
+_converter.register_structure_hook(int, _exactly)
+_converter.register_structure_hook(bool, _exactly)
+
+
+def _reason(error: BaseException, expected: type | None) -> str:
+    """Return what cattrs says, but a field's own check in the words of the check."""
+    if isinstance(error, ValueError) and expected in (None, int, bool):
+        return str(error)
+    return cattrs.v.format_exception(error, expected)
+
+
+def _check_from(low: int, cfg: object, place: str, *names: str) -> None:
+    for name in names:
+        if not getattr(cfg, name) >= low:
+            raise ValueError(f"{place}.{name} must be >= {low}, got {getattr(cfg, name)}")
+
+
+def _check_positive(cfg: object, place: str, *names: str) -> None:
+    for name in names:
+        if not getattr(cfg, name) > 0.0:
+            raise ValueError(f"{place}.{name} must be > 0, got {getattr(cfg, name)}")
+
+
+def _listed(value: Any) -> Any:  # noqa: ANN401
+    if isinstance(value, dict):
+        return {key: _listed(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_listed(item) for item in value]
+    return value

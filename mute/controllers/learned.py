@@ -1,0 +1,104 @@
+"""A trained policy as a controller: estimator and actor, without anything of learning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from rsl_rl.models import MLPModel
+from tensordict import TensorDict
+
+from envs.observations import OBS_DIM
+from envs.quadruped_env import NUM_ACTIONS
+from mute.checkpoint import CheckpointError, load_checkpoint
+from mute.config import TaskCfg, from_plain
+from mute.estimated_env import estimate_group
+from networks.estimator import Estimate, Estimator
+
+__all__ = ["LearnedController", "Policy", "load_policy"]
+
+
+@dataclass
+class Policy:
+    """A trained policy and what it was trained on."""
+
+    task: str
+    """Name of the task."""
+    cfg: TaskCfg
+    """Configuration that it was trained with."""
+    iteration: int
+    """Last finished iteration."""
+    estimator: Estimator
+    """The estimator, in evaluation mode."""
+    actor: MLPModel
+    """rsl_rl's actor, its normaliser inside, in evaluation mode."""
+
+
+def load_policy(path: Path) -> Policy:
+    """Load the policy of a checkpoint, or of the small file that ships.
+
+    Raises:
+        CheckpointError: If the file is missing, damaged, foreign, or does not fit this version.
+    """
+    saved = load_checkpoint(path)
+    try:
+        cfg = from_plain(saved["config"])
+        num_heights = cfg.env.height_map.grid().shape[0]
+        estimator = Estimator(OBS_DIM, num_heights, cfg.agent.estimation.network)
+        estimator.load_state_dict(saved["estimator_state_dict"])
+        actor = _actor(cfg, estimator)
+        actor.load_state_dict(saved["actor_state_dict"])
+        policy = Policy(saved["task"], cfg, saved["iter"], estimator.eval(), actor.eval())
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        reason = str(error).strip().splitlines()[0]
+        raise CheckpointError(f"{path} holds no policy that fits this version: {reason}") from error
+    return policy
+
+
+class LearnedController:
+    """Drives robots with a trained policy; keeps the LSTM state of each."""
+
+    def __init__(self, policy: Policy, num_envs: int) -> None:
+        """Start with no past.
+
+        Args:
+            policy: What to drive with.
+            num_envs: Number of robots.
+        """
+        self.policy = policy
+        self.num_envs = num_envs
+        self._state = policy.estimator.initial_state(num_envs)
+        self.estimate: Estimate | None = None
+        """What the estimator said at the last `act`, None before. Shapes: (num_envs, ...)."""
+
+    def reset(self, mask: torch.Tensor | None = None) -> None:
+        """Forget the past of the masked robots, or of all. Mask shape: (num_envs,)."""
+        if mask is None:
+            mask = torch.ones(self.num_envs, dtype=torch.bool)
+        hidden, cell = self._state
+        column = mask.unsqueeze(1)
+        self._state = (hidden.masked_fill(column, 0.0), cell.masked_fill(column, 0.0))
+
+    @torch.no_grad()
+    def act(self, observations: TensorDict) -> torch.Tensor:
+        """Return the mean actions for one control step. Shape: (num_envs, 12)."""
+        policy = self.policy
+        obs = observations["policy"]
+        self.estimate, self._state = policy.estimator.step(obs, self._state)
+        with_phase = policy.cfg.agent.estimation.actor_uses_phase
+        group = estimate_group(self.estimate, policy.estimator, with_phase)
+        groups = {"policy": obs, "estimate": group}
+        return policy.actor(TensorDict(groups, batch_size=[self.num_envs]))
+
+
+def _actor(cfg: TaskCfg, estimator: Estimator) -> MLPModel:
+    """Build the actor's network with rsl_rl's own class, from the sizes of its inputs."""
+    with torch.no_grad():
+        obs = torch.zeros(1, OBS_DIM)
+        estimate, _ = estimator.step(obs, estimator.initial_state(1))
+    group = estimate_group(estimate, estimator, cfg.agent.estimation.actor_uses_phase)
+    example = TensorDict({"policy": obs, "estimate": group}, batch_size=[1])
+    train_cfg = cfg.agent.rsl_rl()
+    settings = {key: value for key, value in train_cfg["actor"].items() if key != "class_name"}
+    return MLPModel(example, train_cfg["obs_groups"], "actor", NUM_ACTIONS, **settings)

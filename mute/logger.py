@@ -1,0 +1,203 @@
+"""What a training shows and leaves behind: TensorBoard curves, a JSON Lines file, one live line.
+
+Built on rsl_rl's own hooks: a `LogWriter` for the curves and a subclass of its `Logger`, whose
+console page gives way to the display.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+from rsl_rl.utils import LogWriter
+from rsl_rl.utils.logger import Logger
+from torch.utils.tensorboard import SummaryWriter
+
+__all__ = ["CurveWriter", "LiveDisplay", "PlainDisplay", "TrainingLogger"]
+
+_COLUMNS = {
+    "Perf/total_fps": ("steps/s", "{:,.0f}"),
+    "Train/mean_reward": ("reward", "{:.2f}"),
+    "Gait/velocity_error_sq": ("tracking error (m/s)^2", "{:.4f}"),
+    "Gait/landing_speed_low_beta": ("landing speed, beta < 0.25 (m/s)", "{:.3f}"),
+    "Gait/landing_speed_high_beta": ("landing speed, beta > 0.75 (m/s)", "{:.3f}"),
+    "Gait/apex_high_beta": ("apex, beta > 0.75 (m)", "{:.4f}"),
+    "Train/mean_episode_length": ("episode (steps)", "{:.0f}"),
+    "Loss/estimator_velocity_rmse": ("velocity RMSE (m/s)", "{:.3f}"),
+    "Loss/estimator_phase_mae": ("phase MAE", "{:.3f}"),
+}
+"""Curves that the display shows, with their captions."""
+
+
+class CurveWriter(LogWriter):
+    """Writes every scalar to TensorBoard and, an iteration a line, to `curves.jsonl`."""
+
+    def __init__(self, log_dir: str, first_iteration: int = 0) -> None:
+        """Open the files; those of an interrupted run are continued.
+
+        Args:
+            log_dir: Directory of the run.
+            first_iteration: Iteration that logging goes on with; what the files hold from it on was
+                logged by a run that ended without saving it, and is dropped.
+        """
+        self._tensorboard = SummaryWriter(
+            log_dir=log_dir, purge_step=first_iteration or None, flush_secs=10
+        )
+        self._path = Path(log_dir) / "curves.jsonl"
+        _drop_from(self._path, first_iteration)
+        self.latest: dict[str, float] = {}
+        """The current iteration's scalars by tag."""
+
+    def add_scalar(self, tag: str, scalar_value: float, global_step: int) -> None:
+        """Log a scalar."""
+        # rsl_rl logs some curves a second time over seconds; TensorBoard can show that by itself.
+        if tag.endswith("/time"):
+            return
+        self.latest[tag] = float(scalar_value)
+        self._tensorboard.add_scalar(tag, scalar_value, global_step)
+
+    def end_iteration(self, iteration: int) -> dict[str, float]:
+        """Append the iteration's scalars to the file and return them."""
+        scalars, self.latest = self.latest, {}
+        with self._path.open("a") as file:
+            file.write(json.dumps({"iteration": iteration, **scalars}) + "\n")
+        return scalars
+
+    def stop(self) -> None:
+        """Close the files."""
+        self._tensorboard.close()
+
+
+class TrainingLogger(Logger):
+    """rsl_rl's logger with the console page replaced by a callback."""
+
+    def __init__(
+        self,
+        *args: Any,  # noqa: ANN401
+        on_iteration: Callable[[int, int, dict[str, float]], None],
+        **kwargs: Any,  # noqa: ANN401
+    ) -> None:
+        """Take what `Logger` takes, and what to call with (iteration, total, scalars)."""
+        super().__init__(*args, **kwargs)
+        self._on_iteration = on_iteration
+
+    def init_logging_writer(self) -> None:
+        """Open the curves, quietly."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            super().init_logging_writer()
+
+    def log(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401
+        """Log an iteration, see `Logger.log`; show it on the display instead of the console."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            super().log(*args, **kwargs)
+        # rsl_rl's runner names every argument.
+        iteration, total = kwargs["it"], kwargs["total_it"]
+        scalars: dict[str, float] = {}
+        if isinstance(self.writer, CurveWriter):
+            scalars = self.writer.end_iteration(iteration)
+        self._on_iteration(iteration, total, scalars)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return the running averages, so that curves go on where they stopped."""
+        return {
+            "rewards": list(self.rewbuffer),
+            "lengths": list(self.lenbuffer),
+            "reward_sum": self.cur_reward_sum.clone(),
+            "episode_length": self.cur_episode_length.clone(),
+            "total_steps": self.tot_timesteps,
+            "total_time": self.tot_time,
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Continue from a `state_dict`."""
+        self.rewbuffer.extend(state["rewards"])
+        self.lenbuffer.extend(state["lengths"])
+        self.cur_reward_sum = state["reward_sum"].to(self.device)
+        self.cur_episode_length = state["episode_length"].to(self.device)
+        self.tot_timesteps, self.tot_time = state["total_steps"], state["total_time"]
+
+
+class LiveDisplay:
+    """One live progress display for a terminal; a context manager."""
+
+    def __init__(self, title: str) -> None:
+        """Prepare the display; it appears on entering."""
+        self._progress = Progress(
+            TextColumn(f"[bold]{title}"),
+            BarColumn(),
+            TextColumn("{task.completed}/{task.total} iterations"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+        )
+        self._task = self._progress.add_task("train", total=None)
+        self._live = Live(self._progress, console=Console(stderr=True), refresh_per_second=4)
+
+    def __enter__(self) -> LiveDisplay:
+        """Show the display."""
+        self._live.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        """Leave the last state on the screen."""
+        self._live.stop()
+
+    def update(self, iteration: int, total: int, scalars: dict[str, float]) -> None:
+        """Show an iteration's figures."""
+        self._progress.update(self._task, completed=iteration + 1, total=total)
+        self._live.update(Group(self._progress, _figures(scalars)))
+
+
+class PlainDisplay:
+    """One line an iteration, for logs; a context manager."""
+
+    def __enter__(self) -> PlainDisplay:
+        """Start the clock."""
+        self._start, self._first = time.perf_counter(), None
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        """Do nothing: every line is out already."""
+
+    def update(self, iteration: int, total: int, scalars: dict[str, float]) -> None:
+        """Print an iteration's figures and the time left."""
+        self._first = iteration if self._first is None else self._first
+        elapsed = time.perf_counter() - self._start
+        left = elapsed / (iteration + 1 - self._first) * (total - iteration - 1)
+        figures = [
+            f"{caption} {form.format(scalars[tag])}"
+            for tag, (caption, form) in _COLUMNS.items()
+            if tag in scalars
+        ]
+        print(
+            f"{iteration + 1}/{total}", *figures, f"left {left / 60:.1f} min", sep=" | ", flush=True
+        )
+
+
+def _drop_from(path: Path, first_iteration: int) -> None:
+    """Keep the lines before an iteration; a line that a killed process cut short goes as well."""
+    if not path.exists():
+        return
+    kept = []
+    for line in path.read_text().splitlines(keepends=True):
+        with contextlib.suppress(ValueError):
+            if json.loads(line)["iteration"] < first_iteration:
+                kept.append(line)
+    path.write_text("".join(kept))
+
+
+def _figures(scalars: dict[str, float]) -> RenderableType:
+    table = Table.grid(padding=(0, 2))
+    for tag, (caption, form) in _COLUMNS.items():
+        if tag in scalars:
+            table.add_row(caption, form.format(scalars[tag]))
+    return table

@@ -1,0 +1,70 @@
+"""The registry: a task's name and its configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from envs.commands import CommandsCfg
+from envs.quadruped_env import QuadrupedEnvCfg
+from envs.randomization import RandomizationCfg
+from envs.rewards import RewardsCfg
+from mute.config import AgentCfg, TaskCfg
+from mute.errors import MuteError
+
+__all__ = ["DEFAULT_TASK", "make_task", "task_names"]
+
+DEFAULT_TASK = "go1_mute"
+
+
+def _go1_mute_paper() -> TaskCfg:
+    """Return the paper's weights and sizes."""
+    return TaskCfg(
+        env=QuadrupedEnvCfg(num_envs=4096),
+        agent=AgentCfg(
+            iterations=6000, actor_hidden=(512, 256, 128), critic_hidden=(512, 256, 128)
+        ),
+    )
+
+
+def _go1_mute() -> TaskCfg:
+    """Return what works on a CPU within the hour: quiet ramped in, feet held up for every beta."""
+    rewards = RewardsCfg(
+        foot_drop_velocity=-0.1,
+        foot_raise_velocity=0.02,
+        near_ground_drop=-3.0,
+        landing_speed=-6.0,
+        foot_clearance=-20.0,
+        touchdown_apex=-2.0,
+        foot_slip=-0.04,
+        stand_still=-0.1,
+        lift_ramp=(60.0, 120.0),
+        quiet_ramp=(100.0, 220.0),
+    )
+    randomization = RandomizationCfg(push_interval=0.0)
+    commands = CommandsCfg(initial_share=0.4, ramp=(16.0, 50.0))
+    return TaskCfg(
+        env=QuadrupedEnvCfg(rewards=rewards, randomization=randomization, commands=commands),
+        agent=AgentCfg(iterations=700),
+    )
+
+
+_TASKS: dict[str, Callable[[], TaskCfg]] = {
+    "go1_mute": _go1_mute,
+    "go1_mute_paper": _go1_mute_paper,
+}
+
+
+def task_names() -> list[str]:
+    """Return the names of all tasks."""
+    return list(_TASKS)
+
+
+def make_task(name: str) -> TaskCfg:
+    """Return a new configuration of a task.
+
+    Raises:
+        MuteError: If there is no such task.
+    """
+    if name not in _TASKS:
+        raise MuteError(f"--task must be one of {', '.join(_TASKS)}, got {name!r}")
+    return _TASKS[name]()

@@ -1,0 +1,111 @@
+"""Configurations survive being written, and say which of their fields is wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+import yaml
+
+from envs.quadruped_env import QuadrupedEnvCfg
+from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg, from_plain, to_plain
+from mute.tasks import make_task, task_names
+
+
+def _leaves(value: object) -> set[type]:
+    if isinstance(value, dict):
+        return {type(key) for key in value} | {t for v in value.values() for t in _leaves(v)}
+    if isinstance(value, list):
+        return {t for v in value for t in _leaves(v)}
+    return {type(value)}
+
+
+@pytest.mark.parametrize("task", task_names())
+def test_every_task_comes_back_equal_from_plain_data_and_from_yaml(task):
+    cfg = make_task(task)
+    plain = to_plain(cfg)
+    assert _leaves(plain) <= {str, int, float, bool}
+    assert from_plain(plain) == cfg
+    assert from_plain(yaml.safe_load(yaml.safe_dump(plain))) == cfg
+
+
+def test_a_changed_field_of_every_depth_comes_back():
+    cfg = make_task("go1_mute")
+    cfg.env.rewards.quiet_ramp = (1.0, 2.5)
+    cfg.agent.actor_hidden = (7,)
+    cfg.agent.estimation.network.latent_dim = 5
+    back = from_plain(to_plain(cfg))
+    assert back.env.rewards.quiet_ramp == (1.0, 2.5)
+    assert back.agent.actor_hidden == (7,)
+    assert back.agent.estimation.network.latent_dim == 5
+
+
+def test_plain_data_shares_nothing_with_the_configuration():
+    cfg = make_task("go1_mute")
+    to_plain(cfg)["env"]["num_envs"] = 1
+    assert cfg.env.num_envs != 1
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ({"env": {"nope": 1}}, ["nope", "env"]),
+        ({"agnet": {}}, ["agnet"]),
+        ({"agent": {"ppo": {"gama": 0.9}}}, ["gama", "agent.ppo"]),
+        ({"env": {"num_envs": -1}}, ["env.num_envs must be >= 1, got -1"]),
+        ({"env": {"num_envs": 2.7}}, ["env.num_envs", "2.7"]),
+        ({"env": {"num_envs": "many"}}, ["env.num_envs", "many"]),
+        ({"env": {"random_heading": "False"}}, ["env.random_heading", "False"]),
+        ({"env": {"rewards": {"k": 2.0}}}, ["rewards.k", "2.0"]),
+        ({"env": 3}, ["env"]),
+        ({"agent": {"ppo": {"schedule": "cosine"}}}, ["agent.ppo.schedule", "cosine"]),
+        ({"agent": {"iterations": 0}}, ["agent.iterations must be >= 1, got 0"]),
+        ([], ["list"]),
+        (None, ["NoneType"]),
+    ],
+)
+def test_data_that_does_not_fit_is_refused_in_one_line_that_names_the_place(data, words):
+    with pytest.raises(ValueError) as caught:
+        from_plain(data)
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message
+
+
+@pytest.mark.parametrize(
+    ("cls", "field", "value", "name"),
+    [
+        (QuadrupedEnvCfg, "num_envs", -1, "env.num_envs"),
+        (QuadrupedEnvCfg, "episode_length", 0.0, "env.episode_length"),
+        (AgentCfg, "iterations", 0, "agent.iterations"),
+        (AgentCfg, "num_steps_per_env", 0, "agent.num_steps_per_env"),
+        (AgentCfg, "save_interval", 0, "agent.save_interval"),
+        (AgentCfg, "init_std", -1.0, "agent.init_std"),
+        (AgentCfg, "actor_hidden", (), "agent.actor_hidden"),
+        (AgentCfg, "critic_hidden", (8, 0), "agent.critic_hidden"),
+        (AgentCfg, "std_range", (0.0, 1.0), "agent.std_range"),
+        (AgentCfg, "std_range", (2.0, 1.0), "agent.std_range"),
+        (PPOCfg, "num_learning_epochs", 0, "agent.ppo.num_learning_epochs"),
+        (PPOCfg, "num_mini_batches", 0, "agent.ppo.num_mini_batches"),
+        (PPOCfg, "learning_rate", 0.0, "agent.ppo.learning_rate"),
+        (PPOCfg, "clip_param", float("nan"), "agent.ppo.clip_param"),
+        (PPOCfg, "gamma", 1.01, "agent.ppo.gamma"),
+        (PPOCfg, "lam", -0.1, "agent.ppo.lam"),
+        (PPOCfg, "entropy_coef", -0.1, "agent.ppo.entropy_coef"),
+        (EstimationCfg, "num_mini_batches", 0, "agent.estimation.num_mini_batches"),
+        (EstimationCfg, "learning_rate", -1.0, "agent.estimation.learning_rate"),
+        (EstimationCfg, "lambda_kl", -1.0, "agent.estimation.lambda_kl"),
+    ],
+)
+def test_a_bad_value_is_refused_with_the_fields_name_and_the_value(cls, field, value, name):
+    with pytest.raises(ValueError) as caught:
+        dataclasses.replace(cls(), **{field: value})
+    assert name in str(caught.value)
+    assert str(value) in str(caught.value)
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63])
+def test_a_seed_that_torch_does_not_take_is_refused(seed):
+    with pytest.raises(ValueError, match=r"env\.seed"):
+        TaskCfg(env=QuadrupedEnvCfg(seed=seed))

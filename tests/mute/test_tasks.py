@@ -1,0 +1,66 @@
+"""The tasks that ship: the paper's is the paper's."""
+
+from __future__ import annotations
+
+import pytest
+
+from envs.rewards import TERMS
+from mute.errors import MuteError
+from mute.tasks import DEFAULT_TASK, make_task, task_names
+
+TABLE_I = {
+    "lin_vel_tracking": 1.0,
+    "ang_vel_tracking": 0.5,
+    "foot_drop_velocity": -0.05,
+    "foot_raise_velocity": 0.01,
+    "lin_vel_z": -2.0,
+    "ang_vel_xy": -0.05,
+    "joint_power": -2.0e-5,
+    "joint_acc": -2.5e-7,
+    "action_rate": -0.01,
+    "collision": -0.1,
+    "base_height": -1.0,
+    "orientation": -0.2,
+}
+
+
+def test_the_papers_task_has_table_is_weights_and_no_other_term():
+    rewards = make_task("go1_mute_paper").env.rewards
+    weights = {name: getattr(rewards, name) for name in TERMS}
+    assert {name: weight for name, weight in weights.items() if weight != 0.0} == TABLE_I
+
+
+def test_the_papers_task_has_its_constants_and_sizes():
+    cfg = make_task("go1_mute_paper")
+    assert cfg.env.num_envs == 4096
+    assert cfg.agent.iterations == 6000
+    assert cfg.agent.ppo.learning_rate == 1.0e-3
+    assert cfg.agent.estimation.learning_rate == 1.0e-3
+    assert cfg.env.rewards.k == 0.2
+    assert cfg.env.rewards.quiet_ramp == (0.0, 0.0)
+    assert cfg.env.rewards.phase_source == "estimated"
+
+
+def test_the_default_task_is_sized_for_a_cpu():
+    assert DEFAULT_TASK in task_names()
+    assert make_task(DEFAULT_TASK).env.num_envs == 1024
+
+
+def test_the_default_task_asks_for_more_lift_than_the_papers():
+    # With Table I alone the feet rise less than a centimetre.
+    rewards = make_task(DEFAULT_TASK).env.rewards
+    assert rewards.touchdown_apex != 0.0 or rewards.foot_clearance != 0.0
+
+
+@pytest.mark.parametrize("task", task_names())
+def test_each_call_makes_a_configuration_of_its_own(task):
+    make_task(task).env.rewards.lin_vel_tracking = 99.0
+    make_task(task).agent.ppo.gamma = 0.5
+    assert make_task(task).env.rewards.lin_vel_tracking != 99.0
+    assert make_task(task).agent.ppo.gamma != 0.5
+
+
+def test_an_unknown_task_is_refused_with_the_names_there_are():
+    with pytest.raises(MuteError) as caught:
+        make_task("go2")
+    assert all(name in str(caught.value) for name in [*task_names(), "'go2'"])
