@@ -29,8 +29,8 @@ class CommandsCfg:
     resampling_time: float = 10.0
     """Time between new velocity commands within an episode, s."""
     initial_share: float = 1.0
-    """Share of the velocity ranges that commands are drawn from at the start of a training: far
-    from the command the tracking reward is flat, so fast commands teach a standing robot nothing."""
+    """Share of the velocity ranges that a training starts with: far from the command the tracking
+    reward is flat, so fast commands teach a standing robot nothing."""
     ramp: tuple[float, float] = (0.0, 0.0)
     """Seconds of simulated time per environment between which that share grows to 1."""
 

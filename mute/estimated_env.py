@@ -71,12 +71,14 @@ class EstimatedEnv(VecEnv):
         return self.env.cfg
 
     @property
-    def episode_length_buf(self) -> torch.Tensor:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def episode_length_buf(self) -> torch.Tensor:
         """Age of every episode in control steps. Shape: (num_envs,)."""
         return self.env.episode_length_buf
 
     @episode_length_buf.setter
-    def episode_length_buf(self, value: torch.Tensor) -> None:
+    def episode_length_buf(  # pyright: ignore[reportIncompatibleVariableOverride]
+        self, value: torch.Tensor
+    ) -> None:
         self.env.episode_length_buf = value.to(self.env.device)
 
     @property

@@ -20,6 +20,7 @@ from mute.command_lines.arguments import command_line, parse, resolve_device, se
 from mute.config import AgentCfg, TaskCfg, from_plain, to_plain
 from mute.errors import MuteError
 from mute.logger import LiveDisplay, PlainDisplay
+from mute.provenance import current_commit, machine_kind
 from mute.runner import MuteRunner
 from mute.tasks import DEFAULT_TASK, make_task
 
@@ -159,6 +160,8 @@ def _write_parameters(run_dir: Path, args: TrainArgs, cfg: TaskCfg, argv: Sequen
     content = {
         "command": shlex.join(["python", "train.py", *argv]),
         "task": args.task,
+        "commit": current_commit(),
+        "machine": machine_kind(),
         **to_plain(cfg),
     }
     (run_dir / _PARAMETERS).write_text(yaml.safe_dump(content, sort_keys=False))

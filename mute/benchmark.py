@@ -1,0 +1,200 @@
+"""Measure the speed of training, part by part: python -m mute.benchmark.
+
+Every part is timed in one process and in turns with the bare engine, so that a machine whose speed
+drifts does not favour one of them. Each size runs in a process of its own, for its memory.
+"""
+
+from __future__ import annotations
+
+from mute.threads import configure_threads, use_collection_threads, use_learning_threads
+
+configure_threads()  # before torch is imported
+
+import dataclasses
+import json
+import resource
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from mjbatch import Batch
+from rich.progress import track
+from rsl_rl.algorithms import PPO
+
+from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
+from mute.command_lines.arguments import command_line, parse
+from mute.errors import MuteError, run_cli
+from mute.evaluation.tables import print_table, write_json
+from mute.provenance import machine_kind
+from mute.runner import MuteRunner
+from mute.tasks import DEFAULT_TASK, make_task
+
+__all__ = ["BenchmarkArgs", "Rates", "measure"]
+
+
+@dataclass
+class BenchmarkArgs:
+    """Arguments of the benchmark."""
+
+    task: str = DEFAULT_TASK
+    """Task to measure."""
+    num_envs: tuple[int, ...] = (256, 1024, 4096, 8192)
+    """Numbers of environments."""
+    rollouts: int = 5
+    """Rollouts that each part is timed over; the median counts."""
+    json: bool = False
+    """Print JSON and nothing else."""
+    out: Path | None = None
+    """File to write the JSON to as well."""
+
+
+@dataclass
+class Rates:
+    """Control steps a second, environments times steps, of each part of training."""
+
+    num_envs: int
+    """Number of environments."""
+    engine: float
+    """mjbatch alone: the physics steps of a control step in one call, the same model."""
+    environment: float
+    """The environment, with random actions."""
+    collection: float
+    """The environment with estimator and actor-critic in its loop."""
+    learning: float
+    """The update: estimator and PPO."""
+    loop: float
+    """Collection and learning together."""
+    loop_over_engine: float
+    """The whole loop as a share of the engine alone."""
+    peak_memory_mb: float
+    """Largest memory of the process, MB."""
+
+
+def measure(task: str, num_envs: int, rollouts: int) -> Rates:
+    """Return the rates for one number of environments.
+
+    Args:
+        task: Name of the task.
+        num_envs: Number of environments.
+        rollouts: Rollouts to time.
+    """
+    cfg = make_task(task)
+    cfg = dataclasses.replace(cfg, env=dataclasses.replace(cfg.env, num_envs=num_envs))
+    torch.set_float32_matmul_precision(cfg.agent.matmul_precision)
+    runner = MuteRunner(task, cfg, None)
+    steps = cfg.agent.num_steps_per_env
+    parts = {
+        "engine": _engine(runner.env.env, steps),
+        "environment": _environment(QuadrupedEnv(cfg.env), steps),
+        "collection": _collection(runner, steps),
+        "learning": runner.alg.update,
+    }
+    runner.alg.train_mode()
+    times: dict[str, list[float]] = {name: [] for name in parts}
+    for rollout in range(rollouts + 1):
+        for name, part in parts.items():
+            (use_learning_threads if name == "learning" else use_collection_threads)()
+            start = time.perf_counter()
+            part()
+            if rollout > 0:  # the first one warms up, and the estimator only waits in it
+                times[name].append(time.perf_counter() - start)
+    seconds = {name: statistics.median(values) for name, values in times.items()}
+    rates = {name: num_envs * steps / value for name, value in seconds.items()}
+    loop = num_envs * steps / (seconds["collection"] + seconds["learning"])
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    return Rates(
+        num_envs=num_envs,
+        **rates,
+        loop=loop,
+        loop_over_engine=loop / rates["engine"],
+        peak_memory_mb=memory,
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    Raises:
+        MuteError: If an argument is bad.
+    """
+    argv = command_line() if argv is None else list(argv)
+    args = parse(BenchmarkArgs, argv, "Measure the speed of training, part by part.")
+    make_task(args.task)
+    if not args.num_envs or min(args.num_envs) < 1:
+        raise MuteError(f"--num-envs must be numbers >= 1, got {args.num_envs}")
+    if args.rollouts < 1:
+        raise MuteError(f"--rollouts must be >= 1, got {args.rollouts}")
+    sizes = args.num_envs if args.json else track(args.num_envs, "environments")
+    rows = [_in_process(args.task, num_envs, args.rollouts) for num_envs in sizes]
+    content = {"task": args.task, "machine": machine_kind(), "rates": rows}
+    if args.out is not None:
+        write_json(args.out, content)
+    if args.json:
+        print(json.dumps(content))
+    else:
+        print_table(f"control steps/s, {content['machine']}", rows, list(rows[0]))
+    return 0
+
+
+def _in_process(task: str, num_envs: int, rollouts: int) -> dict[str, float]:
+    code = (
+        "import dataclasses, json; from mute.benchmark import measure; "
+        f"print(json.dumps(dataclasses.asdict(measure({task!r}, {num_envs}, {rollouts}))))"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    if result.returncode != 0:
+        raise MuteError(
+            f"--num-envs {num_envs}: the measurement failed: {result.stderr.strip()[-200:]}"
+        )
+    return json.loads(result.stdout.splitlines()[-1])
+
+
+def _engine(env: QuadrupedEnv, steps: int) -> Callable[[], None]:
+    batch = Batch(env.model, env.num_envs)
+    ctrl = batch.bind("ctrl")
+    batch.reset(keyframe=env.model.key("stand").id)
+    noise = 0.1 * torch.randn(steps, env.num_envs, NUM_ACTIONS)
+    targets = (env.stand + noise).double().numpy()
+
+    def run() -> None:
+        for target in targets:
+            ctrl[:] = target
+            batch.step(nstep=env.cfg.decimation)
+
+    return run
+
+
+def _environment(env: QuadrupedEnv, steps: int) -> Callable[[], None]:
+    actions = 0.4 * torch.randn(steps, env.num_envs, NUM_ACTIONS)
+
+    @torch.inference_mode()
+    def run() -> None:
+        for action in actions:
+            env.step(action)
+
+    return run
+
+
+def _collection(runner: MuteRunner, steps: int) -> Callable[[], None]:
+    algorithm: PPO = runner.alg
+    env = runner.env
+
+    @torch.inference_mode()
+    def run() -> None:
+        observations = env.get_observations()
+        for _ in range(steps):
+            actions = algorithm.act(observations)
+            observations, rewards, dones, extras = env.step(actions)
+            algorithm.process_env_step(observations, rewards, dones, extras)
+        algorithm.compute_returns(observations)
+
+    return run
+
+
+if __name__ == "__main__":
+    run_cli(main)

@@ -1,0 +1,149 @@
+"""`evaluate.py`: measure a policy; tables on the console, CSV and JSON beside."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from rich.progress import track
+
+from envs.commands import BETA, CommandSampler
+from envs.quadruped_env import QuadrupedEnv
+from mute.command_lines.arguments import REPOSITORY, command_line, parse
+from mute.controllers import LearnedController, load_policy
+from mute.controllers.learned import Policy
+from mute.errors import MuteError
+from mute.evaluation.estimation_errors import EstimationMeter
+from mute.evaluation.matched_speed import sweep_beta_at_speed
+from mute.evaluation.tables import print_table, write_csv, write_json
+from mute.evaluation.trials import evaluation_cfg, run_trial
+from mute.provenance import machine_kind
+from mute.tasks import DEFAULT_TASK
+
+__all__ = ["main"]
+
+_SWEEP_ROBOTS = 300
+
+
+@dataclass
+class GaitArgs:
+    """Walk over the command range, and at one actual speed for several betas."""
+
+    policy: Path = REPOSITORY / "resources" / "go1" / f"{DEFAULT_TASK}.pt"
+    """Policy to measure."""
+    trials: int = 256
+    """Robots that walk over the command range, for each beta."""
+    seconds: float = 20.0
+    """Length of a trial, s."""
+    beta: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
+    """Quiet factors."""
+    speed: float = 0.5
+    """Actual forward speed at which the betas are compared, m/s."""
+    randomized: bool = False
+    """Keep the training's randomised physics, pushes and sensor noise."""
+    seed: int = 1
+    """Seed of initial states and commands."""
+    out: Path = Path("evaluation")
+    """Directory of the CSV and JSON files."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    Raises:
+        MuteError: If an argument is bad or the policy cannot be used.
+    """
+    argv = command_line() if argv is None else list(argv)
+    if argv[:1] in (["-h"], ["--help"]):
+        print(_USAGE)
+        return 0
+    if argv[:1] != ["gait"]:
+        raise MuteError(f"the first argument must be gait, got {argv[0] if argv else 'nothing'}")
+    _gait(parse(GaitArgs, argv[1:], GaitArgs.__doc__ or ""))
+    return 0
+
+
+_USAGE = """usage: evaluate.py gait [options]
+
+gait   walk over the command range, and at one actual speed for several betas
+
+`evaluate.py gait --help` lists the options."""
+
+
+def _gait(args: GaitArgs) -> None:
+    _check(args)
+    torch.set_num_threads(1)  # the physics engine has the cores
+    policy = load_policy(args.policy)
+    over_range = [_over_range(args, policy, beta) for beta in track(args.beta, "command range")]
+    at_speed = _at_speed(args, policy)
+    columns = ["beta", "fall_rate", "velocity_error_sq", "yaw_rate_error_sq"]
+    columns += ["landing_speed_mean", "apex_mean", "power"]
+    columns += ["velocity_rmse", "height_rmse", "phase_mae"]
+    print_table(f"{args.trials} trials of {args.seconds:g} s over the range", over_range, columns)
+    columns = ["beta", "landing_speed_mean", "landing_speed_rms", "apex_mean", "duty_factor"]
+    columns += ["stride_frequency", "power"]
+    print_table(f"at an actual speed of {args.speed:g} m/s", at_speed, columns)
+    write_csv(args.out / "gait_range.csv", over_range)
+    write_csv(args.out / "gait_at_speed.csv", at_speed)
+    summary = {
+        "policy": os.path.relpath(args.policy, REPOSITORY),
+        "iteration": policy.iteration,
+        "trials": args.trials,
+        "seconds": args.seconds,
+        "speed": args.speed,
+        "randomized": args.randomized,
+        "seed": args.seed,
+        "machine": machine_kind(),
+        "range": over_range,
+        "at_speed": at_speed,
+    }
+    write_json(args.out / "gait.json", summary)
+    print(f"written: {args.out}/gait.json, gait_range.csv, gait_at_speed.csv")
+
+
+def _over_range(args: GaitArgs, policy: Policy, beta: float) -> dict[str, Any]:
+    """Return the figures of one beta over the task's whole command range."""
+    env = _environment(args, policy, args.trials)
+    draw = CommandSampler(
+        env.cfg.commands,
+        env.num_envs,
+        torch.Generator().manual_seed(args.seed),
+        torch.device("cpu"),
+    )
+    draw.resample(torch.ones(env.num_envs, dtype=torch.bool), with_beta=True)
+    draw.command[:, BETA] = beta
+    controller = LearnedController(policy, env.num_envs)
+    estimation = EstimationMeter(env, controller)
+    steps = round(args.seconds / env.step_dt)
+    meter = run_trial(env, controller, draw.command, steps, estimation)
+    return {"beta": beta} | meter.gait().as_dict() | estimation.errors().as_dict()
+
+
+def _at_speed(args: GaitArgs, policy: Policy) -> list[dict[str, float]]:
+    robots = max(_SWEEP_ROBOTS, 12 * len(args.beta))
+    env = _environment(args, policy, robots)
+    # All walk straight ahead, from the stance: only speed and beta differ.
+    controller = LearnedController(policy, robots)
+    steps = round(args.seconds / env.step_dt)
+    return sweep_beta_at_speed(env, controller, args.speed, args.beta, steps)
+
+
+def _environment(args: GaitArgs, policy: Policy, num_envs: int) -> QuadrupedEnv:
+    cfg = evaluation_cfg(policy.cfg.env, num_envs, args.seconds, args.seed, args.randomized)
+    return QuadrupedEnv(dataclasses.replace(cfg, num_threads=0))
+
+
+def _check(args: GaitArgs) -> None:
+    if args.trials < 1:
+        raise MuteError(f"--trials must be >= 1, got {args.trials}")
+    if not args.seconds > 1.0:
+        raise MuteError(f"--seconds must be > 1, got {args.seconds:g}")
+    if not args.beta or any(not 0.0 <= beta <= 1.0 for beta in args.beta):
+        raise MuteError(f"--beta must be numbers in [0, 1], got {' '.join(map(str, args.beta))}")
+    if not 0.0 < args.speed <= 1.0:
+        raise MuteError(f"--speed must be in (0, 1], got {args.speed:g}")

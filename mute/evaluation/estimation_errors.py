@@ -1,0 +1,80 @@
+"""How far the estimator is from the truth while it walks."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import torch
+from tensordict import TensorDict
+
+from envs.phase import hindsight_phase
+from envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE, QuadrupedEnv
+from mute.controllers.learned import LearnedController
+
+__all__ = ["EstimationErrors", "EstimationMeter"]
+
+
+@dataclass
+class EstimationErrors:
+    """Errors of the estimates over all robots and steps."""
+
+    velocity_rmse: float
+    """Root of the mean squared error over axes, m/s."""
+    height_rmse: float
+    """Root mean squared error over the height map, m."""
+    phase_mae: float
+    """Mean absolute error where the phase is known in hindsight."""
+    phase_known: float
+    """Share of the samples in which it is; standing feet have no phase."""
+
+    def as_dict(self) -> dict[str, float]:
+        """Return the errors by name."""
+        return asdict(self)
+
+
+class EstimationMeter:
+    """Compares a controller's estimates with the environment's privileged truth.
+
+    To be called after each step of a trial, see `run_trial`'s `on_step`.
+    """
+
+    def __init__(self, env: QuadrupedEnv, controller: LearnedController) -> None:
+        """Start at zero."""
+        self._env = env
+        self._controller = controller
+        self._velocity: list[torch.Tensor] = []
+        self._height: list[torch.Tensor] = []
+        self._contact: list[torch.Tensor] = []
+        self._phase: list[torch.Tensor] = []
+        self._starts: list[torch.Tensor] = [torch.ones(env.num_envs, dtype=torch.bool)]
+
+    def __call__(self, observations: TensorDict, dones: torch.Tensor) -> None:
+        """Take in the observations that were acted on, and which episodes then ended."""
+        estimate = self._controller.estimate
+        if estimate is None:
+            raise ValueError("the controller has not acted yet")
+        privileged, columns = observations["privileged"], self._env.privileged_slices
+        velocity = privileged[:, columns["base_lin_vel"]]
+        heights = HEIGHT_OFFSET + HEIGHT_SCALE * privileged[:, columns["heights"]]
+        self._velocity.append((estimate.base_lin_vel - velocity).square().mean())
+        self._height.append((estimate.heights - heights).square().mean())
+        self._contact.append(privileged[:, columns["contact"]] > 0.5)
+        self._phase.append(estimate.phase)
+        self._starts.append(dones.clone())
+
+    def errors(self) -> EstimationErrors:
+        """Return the errors so far."""
+        feet = self._env.footfalls
+        truth, known = hindsight_phase(
+            torch.stack(self._contact),
+            torch.stack(self._starts[:-1]),
+            feet.min_steps,
+            feet.max_steps,
+        )
+        error = (torch.stack(self._phase) - truth).abs()[known]
+        return EstimationErrors(
+            velocity_rmse=float(torch.stack(self._velocity).mean().sqrt()),
+            height_rmse=float(torch.stack(self._height).mean().sqrt()),
+            phase_mae=float(error.mean()),
+            phase_known=float(known.float().mean()),
+        )

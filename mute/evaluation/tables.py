@@ -1,0 +1,62 @@
+"""Figures as tables: on the console, and as CSV and JSON for other programs."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+__all__ = ["print_table", "read_json", "without_nan", "write_csv", "write_json"]
+
+Row = Mapping[str, Any]
+
+
+def print_table(title: str, rows: Sequence[Row], columns: Sequence[str]) -> None:
+    """Print some columns of a table."""
+    table = Table(title=title, title_justify="left")
+    for column in columns:
+        table.add_column(column, justify="right")
+    for row in rows:
+        table.add_row(*(_shown(row[column]) for column in columns))
+    Console().print(table)
+
+
+def write_csv(path: Path, rows: Sequence[Row]) -> None:
+    """Write a table as CSV with a header."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def write_json(path: Path, content: object) -> None:
+    """Write plain data as JSON; NaN becomes null, which JSON lacks a number for."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(without_nan(content), indent=2) + "\n")
+
+
+def read_json(path: Path) -> Any:  # noqa: ANN401
+    """Return what a JSON file holds."""
+    return json.loads(path.read_text())
+
+
+def without_nan(value: Any) -> Any:  # noqa: ANN401
+    """Return plain data with None for every number that is not finite."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Mapping):
+        return {key: without_nan(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [without_nan(item) for item in value]
+    return value
+
+
+def _shown(value: Any) -> str:  # noqa: ANN401
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

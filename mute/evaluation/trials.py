@@ -1,0 +1,82 @@
+"""Trials: a controller, robots side by side, commands held for a time, figures at the end."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import torch
+from tensordict import TensorDict
+
+from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from mute.controllers.controller import Controller
+from mute.evaluation.gait import GaitMeter
+
+__all__ = ["evaluation_cfg", "run_trial"]
+
+
+def evaluation_cfg(
+    cfg: QuadrupedEnvCfg, num_envs: int, seconds: float, seed: int, randomized: bool = False
+) -> QuadrupedEnvCfg:
+    """Return a task's environment for measuring.
+
+    Commands are set by whoever measures and never drawn anew within an episode.
+
+    Args:
+        cfg: The environment that the policy was trained in.
+        num_envs: Number of robots.
+        seconds: Length of an episode, s.
+        seed: Seed of the initial states.
+        randomized: Keep the training's physics randomisation, pushes and sensor noise; otherwise
+            the model as it is, no pushes, no noise.
+    """
+    measured = dataclasses.replace(
+        cfg,
+        num_envs=num_envs,
+        seed=seed,
+        # One step longer than the trial, so that its last step is measured and not reset.
+        episode_length=seconds + cfg.step_dt,
+        commands=dataclasses.replace(cfg.commands, resampling_time=10.0 * seconds + 10.0),
+    )
+    if randomized:
+        return measured
+    return dataclasses.replace(
+        measured,
+        observations=dataclasses.replace(cfg.observations, noise_level=0.0),
+        randomization=dataclasses.replace(cfg.randomization, enabled=False),
+    )
+
+
+def run_trial(
+    env: QuadrupedEnv,
+    controller: Controller,
+    commands: torch.Tensor,
+    num_steps: int,
+    on_step: Callable[[TensorDict, torch.Tensor], None] | None = None,
+) -> GaitMeter:
+    """Walk for a number of control steps with fixed commands and return the meter.
+
+    A robot that falls starts again, with the same command; it stays counted as fallen.
+
+    Args:
+        env: The environment; it is reset first.
+        controller: What drives; its past is forgotten first.
+        commands: (v_x, v_y, w_z, beta). Shape: (num_envs, 4) or (4,).
+        num_steps: Control steps.
+        on_step: Called after each step with the observations that were acted on and the dones.
+    """
+    env.reset()
+    env.set_command(commands)
+    controller.reset()
+    meter = GaitMeter(env)
+    for _ in range(num_steps):
+        command = env.commands.command.clone()
+        acted_on = env.get_observations()
+        _, _, dones, _ = env.step(controller.act(acted_on))
+        meter.update(command, dones)
+        if on_step is not None:
+            on_step(acted_on, dones)
+        if bool(dones.any()):
+            controller.reset(dones)
+            env.set_command(commands)
+    return meter
