@@ -1,0 +1,328 @@
+"""`play.py`: watch a policy walk, steer it, film it, or have its figures."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import math
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from envs.quadruped_env import QuadrupedEnv
+from envs.scene import Look, SceneError
+from mute.checkpoint import latest_checkpoint
+from mute.command_lines.arguments import REPOSITORY, command_line, parse
+from mute.controllers import LearnedController, load_policy
+from mute.controllers.learned import Policy
+from mute.errors import EXIT_INTERRUPTED, MuteError
+from mute.evaluation.gait import Gait
+from mute.evaluation.trials import evaluation_cfg
+from mute.rendering.backend import has_display, why_no_window
+from mute.rendering.keys import KEYS_HELP
+from mute.rendering.video import Video
+from mute.session import COMMAND_LIMITS, Command, Session
+from mute.tasks import DEFAULT_TASK, make_task
+from mute.threads import use_collection_threads
+
+__all__ = ["PlayArgs", "captions", "main", "report"]
+
+_DEFAULT_SECONDS = 20.0
+_MAX_SECONDS = 86400.0
+_MAX_ENVS = 16384
+_SETTLE_TIME = 1.0
+"""Time after the start that the summary leaves out, s; half of a shorter walk."""
+
+_DESCRIPTION = f"""\
+Watch a policy walk, steer it, film it, or have its figures.
+
+Where there is a display, a window opens; else figures are printed as it walks.
+
+{KEYS_HELP}"""
+
+_REPORTED = (
+    "speed",
+    "velocity_error_sq",
+    "landing_speed_mean",
+    "landing_speed_rms",
+    "apex_mean",
+    "duty_factor",
+    "stride_frequency",
+    "power",
+    "fall_rate",
+)
+"""Figures of a `Gait` that --json prints."""
+
+
+@dataclass
+class PlayArgs:
+    """Arguments of `play.py`."""
+
+    beta: float = 0.5
+    """Quiet factor: 0 for speed, 1 for silence."""
+    task: str | None = None
+    """Task whose shipped policy walks; go1_mute unless given."""
+    policy: Path | None = None
+    """Policy to run instead: a checkpoint, or 'latest' for the newest under runs/."""
+    vx: float = 0.5
+    """Forward velocity, m/s; from -2 to 2."""
+    vy: float = 0.0
+    """Velocity to the left, m/s; from -1 to 1."""
+    wz: float = 0.0
+    """Yaw rate, rad/s; from -2 to 2."""
+    seconds: float | None = None
+    """Time to walk, s; 20 unless given, or until the window is closed."""
+    seed: int = 0
+    """Seed of the initial states."""
+    num_envs: int = 1
+    """Number of robots; the first is shown, the figures are of all."""
+    video: Path | None = None
+    """Film to this .mp4 file, without a window."""
+    viewer: Literal["auto", "native", "none"] = "auto"
+    """native opens a window, none does not, auto does where there is a display."""
+    look: Look = "primitives"
+    """The robot's look; menagerie needs the package mujoco_menagerie."""
+    json: bool = False
+    """Print one JSON object with the figures on standard output, and nothing else there."""
+
+    def check(self) -> None:
+        """Check the ranges.
+
+        Raises:
+            MuteError: If a value is out of its range.
+        """
+        for name, (low, high) in COMMAND_LIMITS.items():
+            _require(name, getattr(self, name), low, high)
+        if self.seconds is not None:
+            _require("seconds", self.seconds, 0.0, _MAX_SECONDS, above=True)
+        _require("num-envs", self.num_envs, 1, _MAX_ENVS)
+        _require("seed", self.seed, 0, 2**31 - 1)
+        if self.video and self.video.suffix.lower() != ".mp4":
+            raise MuteError(f"--video must name an .mp4 file, got {str(self.video)!r}")
+        if self.video and self.viewer == "native":
+            raise MuteError("--video films without a window, so not with --viewer native")
+
+    @property
+    def command(self) -> Command:
+        """What the robots are asked to do at first."""
+        return Command(self.vx, self.vy, self.wz, self.beta)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    Raises:
+        MuteError: If an argument is bad, a policy cannot be used, or a picture cannot be made.
+    """
+    args = parse(PlayArgs, command_line() if argv is None else argv, _DESCRIPTION)
+    args.check()
+    if not args.json:
+        try:
+            return _play(args)[1]
+        except BrokenPipeError:  # the reader of our lines, `head` say, has had enough
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
+    # Whatever a library may print must not get between the reader and the object.
+    with contextlib.redirect_stdout(sys.stderr):
+        session, status = _play(args)
+    print(json.dumps(report(session), allow_nan=False))
+    return status
+
+
+def report(session: Session) -> dict[str, Any]:
+    """Return what --json prints; figures that were not to be had are None."""
+    command = session.command
+    gait = session.gait().as_dict()
+    return {
+        "beta": command.beta,
+        "command": [command.vx, command.vy, command.wz],
+        "num_envs": session.env.num_envs,
+        "seconds": round(session.seconds, 6),
+        **{name: gait[name] if math.isfinite(gait[name]) else None for name in _REPORTED},
+    }
+
+
+def captions(gait: Gait) -> dict[str, str]:
+    """Return the figures to read as the robot walks, by name."""
+    figures = {
+        "speed": f"{gait.speed:z.2f} m/s",
+        "tracking error": f"{gait.velocity_error_sq:.4f} (m/s)^2",
+        "landing speed": f"{gait.landing_speed_mean:.3f} m/s",
+        "apex": f"{100.0 * gait.apex_mean:.1f} cm",
+        "duty factor": f"{gait.duty_factor:.2f}",
+        "strides": f"{gait.stride_frequency:.2f} Hz",
+    }
+    return {name: "-" if text.startswith("nan") else text for name, text in figures.items()}
+
+
+def _play(args: PlayArgs) -> tuple[Session, int]:
+    """Walk as asked and return the walk and the exit status."""
+    use_collection_threads()
+    in_window = _wants_window(args)
+    session = _make_session(args, endless=in_window and args.seconds is None)
+    status = 0
+    try:
+        if in_window:
+            _walk_in_window(args, session)
+        elif args.video:
+            _walk_on_video(args, session, args.video)
+        else:
+            _walk_in_text(args, session)
+    except KeyboardInterrupt:
+        print(f"interrupted after {session.seconds:.1f} s", file=sys.stderr)
+        status = EXIT_INTERRUPTED
+    if not args.json:
+        _print_summary(session)
+    return session, status
+
+
+def _wants_window(args: PlayArgs) -> bool:
+    """Tell whether to open a window.
+
+    Raises:
+        MuteError: If one is asked for and none can open.
+    """
+    if args.viewer == "none" or args.video:
+        return False
+    reason = why_no_window(os.environ, sys.platform)
+    if reason is None:
+        return True
+    if args.viewer == "native":
+        raise MuteError(f"--viewer native: {reason}")
+    if has_display(os.environ, sys.platform):
+        print(f"figures in place of a window: {reason}", file=sys.stderr)
+    return False
+
+
+def _make_session(args: PlayArgs, endless: bool) -> Session:
+    policy = load_policy(_policy_path(args))
+    if args.task is not None and policy.task != args.task:
+        raise MuteError(f"{_policy_path(args)} is of task {policy.task!r}, not {args.task!r}")
+    seconds = _MAX_SECONDS if endless else args.seconds or _DEFAULT_SECONDS
+    cfg = evaluation_cfg(policy.cfg.env, args.num_envs, seconds, args.seed)
+    # All walk along x, so that the camera has the same view of every walk.
+    cfg = dataclasses.replace(
+        cfg, random_heading=False, scene=dataclasses.replace(cfg.scene, look=args.look)
+    )
+    try:
+        env = QuadrupedEnv(cfg)
+    except SceneError as error:
+        raise MuteError(str(error)) from error
+    _print_header(args, policy)
+    settle_time = min(_SETTLE_TIME, 0.5 * seconds)
+    return Session(env, LearnedController(policy, args.num_envs), args.command, settle_time)
+
+
+def _policy_path(args: PlayArgs) -> Path:
+    """Return the file of the policy to run.
+
+    Raises:
+        MuteError: If there is no such task, or none ships for it.
+    """
+    task = args.task or DEFAULT_TASK
+    make_task(task)
+    if args.policy is None:
+        path = REPOSITORY / "resources" / "go1" / f"{task}.pt"
+        if not path.is_file():
+            raise MuteError(
+                f"no policy ships for task {task!r} ({path} is missing): learn one with "
+                f"python train.py --task {task}, or name one with --policy"
+            )
+        return path
+    return latest_checkpoint(Path("runs"), task) if str(args.policy) == "latest" else args.policy
+
+
+def _num_steps(args: PlayArgs, session: Session) -> int:
+    return max(1, round((args.seconds or _DEFAULT_SECONDS) / session.env.step_dt))
+
+
+def _walk_in_window(args: PlayArgs, session: Session) -> None:
+    from mute.rendering.window import watch  # loads GLFW, which only a window needs
+
+    def shown() -> dict[str, str]:
+        command = session.command
+        return {
+            "beta": f"{command.beta:.2f}",
+            "command": f"{command.vx:.2f} {command.vy:.2f} m/s {command.wz:.2f} rad/s",
+            **captions(session.recent_gait()),
+        }
+
+    print(KEYS_HELP, flush=True)
+    num_steps = None if args.seconds is None else _num_steps(args, session)
+    watch(session, num_steps, shown)
+
+
+def _walk_on_video(args: PlayArgs, session: Session, path: Path) -> None:
+    video = Video(path, session.env)
+    try:
+        with video:
+            _walk_in_text(args, session, video.record)
+    except KeyboardInterrupt:
+        print(f"{path} holds what was filmed so far", file=sys.stderr)
+        raise
+    print(f"video: {path} ({video.frame_rate:.0f} pictures a second)", file=sys.stderr)
+
+
+def _walk_in_text(
+    args: PlayArgs, session: Session, on_step: Callable[[], None] | None = None
+) -> None:
+    """Walk as fast as it goes and print the figures of each second, or a bar while filming."""
+    num_steps = _num_steps(args, session)
+    per_second = round(1.0 / session.env.step_dt)
+    show_bar = on_step is not None and not args.json and sys.stderr.isatty()
+    with _progress(num_steps, show_bar) as advance:
+        for _ in range(num_steps):
+            session.step()
+            if on_step is not None:
+                on_step()
+            advance()
+            if session.steps % per_second == 0 and not (show_bar or args.json):
+                figures = [f"{k} {v}" for k, v in captions(session.recent_gait()).items()]
+                print(f"{session.seconds:5.1f} s", *figures, sep=" | ", flush=True)
+
+
+@contextlib.contextmanager
+def _progress(total: int, shown: bool) -> Iterator[Callable[[], None]]:
+    """Show a progress bar on standard error, if wanted; yields what advances it."""
+    if not shown:
+        yield lambda: None
+        return
+    columns = (TextColumn("filming"), BarColumn(), TextColumn("left"), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task = progress.add_task("filming", total=total)
+        yield lambda: progress.advance(task)
+
+
+def _print_header(args: PlayArgs, policy: Policy) -> None:
+    command = args.command
+    print(
+        f"{policy.task}, iteration {policy.iteration}: beta {command.beta:g}, asked for "
+        f"{command.vx:g} m/s forward, {command.vy:g} m/s left, {command.wz:g} rad/s",
+        flush=True,
+    )
+
+
+def _print_summary(session: Session) -> None:
+    gait, robots = session.gait(), session.env.num_envs
+    print(f"\nover {session.seconds:.1f} s, {robots} robot{'s' * (robots > 1)}:")
+    figures = captions(gait) | {
+        "landing speed, rms": f"{gait.landing_speed_rms:.3f} m/s",
+        "power": f"{gait.power:.1f} W",
+        "fell": f"{100.0 * gait.fall_rate:.1f} % of the robots",
+    }
+    for name, text in figures.items():
+        print(f"  {name:20}{'-' if text.startswith('nan') else text}")
+
+
+def _require(name: str, value: float, low: float, high: float, above: bool = False) -> None:
+    """Refuse a value outside [low, high], or outside (low, high] where `above`."""
+    if not (math.isfinite(value) and low <= value <= high) or (above and value == low):
+        lowest = f"above {low:g}" if above else f"at least {low:g}"
+        raise MuteError(f"--{name} must be {lowest} and at most {high:g}, got {value:g}")

@@ -1,0 +1,180 @@
+"""Record a walk as an H.264 video: off-screen pictures with the camera on the robot.
+
+What renders is chosen by `backend`, before mujoco is imported. Walking is left to the caller.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import imageio
+import mujoco
+import numpy as np
+
+from envs.quadruped_env import QuadrupedEnv
+from mute.errors import MuteError
+
+__all__ = ["Video"]
+
+_WIDTH, _HEIGHT = 1280, 720
+_SOFTWARE_RATE = 25.0
+"""Most pictures a second where the processor renders; each costs it over 0.1 s."""
+_SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "software")
+_LOOK_AT_HEIGHT = 0.2
+"""Height of the point that the camera looks at, m: the trunk's bobbing stays to be seen."""
+
+
+class Video:
+    """A video file of robot 0 of an environment; a context manager.
+
+    The file gets its name when it is complete. Leaving by Ctrl-C completes it with what there is;
+    leaving by another exception removes it.
+    """
+
+    def __init__(self, path: Path, env: QuadrupedEnv) -> None:
+        """Prepare to render and make the file's directory; the file itself begins on entering.
+
+        Args:
+            path: The file, its name ending in .mp4; an old one is replaced at the end.
+            env: The environment to look at.
+
+        Raises:
+            MuteError: If the path cannot be a video, or nothing renders.
+        """
+        self.path = path
+        self._env = env
+        self._temporary = _temporary_name(path)
+        self._steps = 0
+        self._renderer, software = _make_renderer(env.model)
+        rate = min(_SOFTWARE_RATE, 1.0 / env.step_dt) if software else 1.0 / env.step_dt
+        self._stride = max(1, round(1.0 / (rate * env.step_dt)))
+        self.frame_rate = 1.0 / (self._stride * env.step_dt)
+        """Pictures a second: one a control step, fewer where the processor has to render."""
+        self._data = mujoco.MjData(env.model)
+        self._camera = mujoco.MjvCamera()
+        self._camera.azimuth, self._camera.elevation, self._camera.distance = 125.0, -14.0, 1.5
+
+    def __enter__(self) -> Video:
+        """Begin the file with a picture of the present."""
+        self._writer: Any = imageio.get_writer(
+            self._temporary,
+            fps=self.frame_rate,
+            codec="libx264",
+            quality=8,
+            pixelformat="yuv420p",  # what every player can show
+            output_params=["-preset", "veryfast"],
+            ffmpeg_log_level="error",
+        )
+        try:
+            self._append()
+        except BaseException as error:
+            self.__exit__(type(error), error, error.__traceback__)
+            raise
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Complete the file, or remove it after an error.
+
+        Raises:
+            MuteError: If the file cannot be completed.
+        """
+        self._renderer.close()
+        if exc_type is None or issubclass(exc_type, KeyboardInterrupt):
+            try:
+                self._writer.close()
+                os.replace(self._temporary, self.path)
+            except OSError as error:
+                self._discard()
+                raise _cannot_write(self.path, error) from error
+        else:
+            self._discard()
+
+    def record(self) -> None:
+        """Take in the control step that the environment has just made.
+
+        Raises:
+            MuteError: If the file cannot be written.
+        """
+        self._steps += 1
+        if self._steps % self._stride == 0:
+            self._append()
+
+    def _append(self) -> None:
+        try:
+            self._writer.append_data(self._picture())
+        except OSError as error:
+            raise _cannot_write(self.path, error) from error
+
+    def _picture(self) -> np.ndarray:
+        """Return robot 0 as it stands now. Shape: (height, width, 3), uint8."""
+        simulation, data = self._env.simulation, self._data
+        data.qpos[:] = simulation.qpos[0].numpy()
+        mujoco.mj_forward(self._env.model, data)
+        self._camera.lookat[:] = (*data.qpos[:2], _LOOK_AT_HEIGHT)
+        self._renderer.update_scene(data, self._camera)
+        return self._renderer.render()
+
+    def _discard(self) -> None:
+        with contextlib.suppress(OSError):
+            self._writer.close()
+        self._temporary.unlink(missing_ok=True)
+
+
+def _temporary_name(path: Path) -> Path:
+    """Return where the file grows until it is complete, beside its place; it can be written.
+
+    Raises:
+        MuteError: If it cannot.
+    """
+    if path.is_dir():
+        raise MuteError(f"--video: {path} is a directory")
+    temporary = path.with_name(f"{path.stem}.{os.getpid()}.tmp.mp4")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.touch()
+    except OSError as error:
+        raise _cannot_write(path, error) from error
+    temporary.unlink()
+    return temporary
+
+
+def _cannot_write(path: Path, error: OSError) -> MuteError:
+    reason = error.strerror or str(error).strip().splitlines()[0]
+    return MuteError(f"--video: cannot write {path}: {reason}")
+
+
+def _make_renderer(model: mujoco.MjModel) -> tuple[mujoco.Renderer, bool]:
+    """Return a renderer, and whether the processor does its work."""
+    try:
+        software = _renders_in_software()
+        if software:
+            # Four times as fast; the edges' steps drown in the compression.
+            model.vis.quality.offsamples = 0
+            model.vis.quality.shadowsize = 2048
+        renderer = mujoco.Renderer(model, _HEIGHT, _WIDTH)
+        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = not software
+    except Exception as error:  # each platform's context raises its own
+        raise MuteError(f"--video: cannot render here: {error}") from error
+    return renderer, software
+
+
+def _renders_in_software() -> bool:
+    if sys.platform != "linux":
+        return False
+    from OpenGL import GL  # looks at what MuJoCo has chosen, so not before it
+
+    context = mujoco.GLContext(16, 16)
+    context.make_current()
+    name = GL.glGetString(GL.GL_RENDERER) or b""
+    context.free()
+    return any(word in name.decode().lower() for word in _SOFTWARE_RENDERERS)
