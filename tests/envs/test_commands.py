@@ -105,3 +105,23 @@ def test_commands_are_written_in_place():
 def test_a_bad_field_is_refused_by_name(field, value):
     with pytest.raises(ValueError, match=f"commands.{field}"):
         CommandsCfg(**{field: value})
+
+
+def test_the_ranges_of_the_velocities_grow_with_the_training_and_beta_does_not():
+    asked = {}
+    for progress in (0.0, 0.5, 1.0):
+        sampler = _make_sampler(2000, standing_fraction=0.0, initial_share=0.4)
+        everywhere = torch.ones(2000, dtype=torch.bool)
+        sampler.resample(everywhere, with_beta=True, progress=progress)
+        asked[progress] = sampler.command
+    torch.testing.assert_close(asked[0.0][:, :3], 0.4 * asked[1.0][:, :3])
+    torch.testing.assert_close(asked[0.5][:, :3], 0.7 * asked[1.0][:, :3])
+    assert torch.equal(asked[0.0][:, 3], asked[1.0][:, 3])
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("initial_share", 1.5), ("initial_share", -0.1), ("ramp", (2.0, 1.0))]
+)
+def test_a_bad_growth_is_refused_by_name(field, value):
+    with pytest.raises(ValueError, match=f"commands.{field}"):
+        CommandsCfg(**{field: value})
