@@ -6,6 +6,7 @@ import csv
 import dataclasses
 import json
 import math
+from typing import Any
 
 import pytest
 import torch
@@ -46,7 +47,7 @@ def _make_env(num_envs=2, seconds=1.0):
 
 
 def _make_gait(**given):
-    zeros = {field.name: 0.0 for field in dataclasses.fields(Gait)}
+    zeros: dict[str, Any] = {field.name: 0.0 for field in dataclasses.fields(Gait)}
     return Gait(**(zeros | given))
 
 
@@ -128,6 +129,7 @@ def test_estimation_errors_are_those_of_the_estimates_against_the_truth(policy_p
         meter(observations, dones)
         privileged, columns = observations["privileged"], env.privileged_slices
         estimate = controller.estimate
+        assert estimate is not None
         velocity.append(estimate.base_lin_vel - privileged[:, columns["base_lin_vel"]])
         heights.append(estimate.heights - (0.3 + 0.1 * privileged[:, columns["heights"]]))
 
