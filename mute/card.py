@@ -1,0 +1,107 @@
+"""Print the card of a policy, and a benchmark, as the README's tables: python -m mute.card."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mute.command_lines.arguments import REPOSITORY, command_line, parse
+from mute.errors import MuteError, run_cli
+from mute.evaluation.tables import read_json
+from mute.tasks import DEFAULT_TASK
+
+__all__ = ["CardArgs", "main", "markdown"]
+
+_RANGE = {
+    "beta": ("beta", "{:g}"),
+    "fall_rate": ("falls", "{:.1%}"),
+    "velocity_error_sq": ("velocity error (m/s)^2", "{:.4f}"),
+    "velocity_rmse": ("estimator: velocity RMSE (m/s)", "{:.3f}"),
+    "height_rmse": ("height RMSE (m)", "{:.4f}"),
+    "phase_mae": ("phase MAE", "{:.3f}"),
+}
+_AT_SPEED = {
+    "beta": ("beta", "{:g}"),
+    "landing_speed_mean": ("landing speed (m/s)", "{:.3f}"),
+    "landing_speed_rms": ("its RMS", "{:.3f}"),
+    "apex_mean": ("apex (cm)", "{:.1f}"),
+    "duty_factor": ("duty factor", "{:.2f}"),
+    "stride_frequency": ("strides/s a foot", "{:.2f}"),
+    "power": ("power (W)", "{:.1f}"),
+}
+_RATES = {
+    "num_envs": ("environments", "{:d}"),
+    "engine": ("engine alone", "{:,.0f}"),
+    "environment": ("environment", "{:,.0f}"),
+    "collection": ("collection", "{:,.0f}"),
+    "learning": ("learning", "{:,.0f}"),
+    "loop": ("whole loop", "{:,.0f}"),
+    "loop_over_engine": ("loop / engine", "{:.0%}"),
+    "peak_memory_mb": ("memory (MB)", "{:,.0f}"),
+}
+
+
+@dataclass
+class CardArgs:
+    """Arguments of the card."""
+
+    card: Path = REPOSITORY / "resources" / "go1" / f"{DEFAULT_TASK}.json"
+    """Card that `mute.release` wrote."""
+    benchmark: Path = REPOSITORY / "docs" / "benchmark.json"
+    """File that `mute.benchmark --out` wrote."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    Raises:
+        MuteError: If a file is missing.
+    """
+    argv = command_line() if argv is None else list(argv)
+    args = parse(CardArgs, argv, "Print a policy's card and a benchmark as Markdown.")
+    for path in (args.card, args.benchmark):
+        if not path.is_file():
+            raise MuteError(f"no file at {path}")
+    card, benchmark = read_json(args.card), read_json(args.benchmark)
+    figures = card["figures"]
+    print(
+        f"`{card['command']}`, seed {card['seed']}, commit {card['commit'][:10]}: "
+        f"{card['iterations']} iterations, {card['steps'] / 1e6:.1f} M steps, "
+        f"{card['wall_time_minutes']:.0f} min on {card['machine']}.\n"
+    )
+    print(f"Over the command range, {figures['trials']} trials of {figures['seconds']:g} s:\n")
+    print(markdown(figures["range"], _RANGE))
+    print(f"\nAt an actual forward speed of {figures['speed']:g} m/s:\n")
+    in_cm = [row | {"apex_mean": _times(row["apex_mean"], 100.0)} for row in figures["at_speed"]]
+    print(markdown(in_cm, _AT_SPEED))
+    print(f"\nControl steps/s of `{benchmark['task']}` on {benchmark['machine']}:\n")
+    print(markdown(benchmark["rates"], _RATES))
+    return 0
+
+
+def markdown(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, tuple[str, str]]) -> str:
+    """Return rows as a Markdown table.
+
+    Args:
+        rows: Values by name.
+        columns: By name, a column's caption and the format of its values.
+    """
+    lines = ["| " + " | ".join(caption for caption, _ in columns.values()) + " |"]
+    lines.append("|" + " --- |" * len(columns))
+    for row in rows:
+        cells = [
+            "-" if row[name] is None else form.format(row[name])
+            for name, (_, form) in columns.items()
+        ]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def _times(value: float | None, factor: float) -> float | None:
+    return None if value is None else factor * value
+
+
+if __name__ == "__main__":
+    run_cli(main)
