@@ -8,7 +8,7 @@ from envs.commands import CommandsCfg
 from envs.quadruped_env import QuadrupedEnvCfg
 from envs.randomization import RandomizationCfg
 from envs.rewards import RewardsCfg
-from mute.config import AgentCfg, TaskCfg
+from mute.config import AgentCfg, EstimationCfg, TaskCfg
 from mute.errors import MuteError
 
 __all__ = ["DEFAULT_TASK", "make_task", "task_names"]
@@ -17,11 +17,14 @@ DEFAULT_TASK = "go1_mute"
 
 
 def _go1_mute_paper() -> TaskCfg:
-    """Return the paper's weights and sizes."""
+    """Return the paper's weights, sizes and inputs of the actor."""
     return TaskCfg(
         env=QuadrupedEnvCfg(num_envs=4096),
         agent=AgentCfg(
-            iterations=6000, actor_hidden=(512, 256, 128), critic_hidden=(512, 256, 128)
+            iterations=6000,
+            actor_hidden=(512, 256, 128),
+            critic_hidden=(512, 256, 128),
+            estimation=EstimationCfg(actor_uses_phase=False),
         ),
     )
 

@@ -1,10 +1,16 @@
-"""What every test may count on: torch as it found it."""
+"""What every test may count on: one torch thread to begin with, and torch as it found it."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 
 import pytest
+
+# Before torch is imported: tensors here are tiny, and on a busy machine the threads of two pools
+# cost more time than all tests together.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import torch
 
 

@@ -26,9 +26,8 @@ from mute.tasks import DEFAULT_TASK, make_task
 
 __all__ = ["main"]
 
-_CPU_ENVS = 1024
-"""Environments that a CPU task runs unless told otherwise; `go1_mute` is sized for this."""
 _GPU_ENVS = 4096
+"""Environments of `go1_mute` where the networks are on a GPU; its own 1024 suit a CPU."""
 _PARAMETERS = "config.yaml"
 
 
@@ -100,6 +99,9 @@ def _arguments(argv: Sequence[str]) -> tuple[TrainArgs, Path | None]:
     cfg = make_task(task)
     args = _parse(argv, task, cfg)
     if args.resume is None:
+        if task == DEFAULT_TASK and resolve_device(args.device) == "cuda":
+            cfg = dataclasses.replace(cfg, env=dataclasses.replace(cfg.env, num_envs=_GPU_ENVS))
+            args = _parse(argv, task, cfg)
         return args, None
     path = latest_checkpoint(args.log_dir, task) if args.resume == "latest" else Path(args.resume)
     saved = load_checkpoint(path)
@@ -124,8 +126,6 @@ def _configuration(args: TrainArgs) -> TaskCfg:
     env_changes: dict[str, Any] = {}
     if args.num_envs is not None:
         env_changes["num_envs"] = args.num_envs
-    elif args.resume is None and args.task == DEFAULT_TASK and args.env.num_envs == _CPU_ENVS:
-        env_changes["num_envs"] = _GPU_ENVS if resolve_device(args.device) == "cuda" else _CPU_ENVS
     if args.seed is not None:
         env_changes["seed"] = args.seed
     agent_changes = {} if args.iterations is None else {"iterations": args.iterations}

@@ -36,6 +36,7 @@ def test_the_papers_task_has_its_constants_and_sizes():
     assert cfg.agent.iterations == 6000
     assert cfg.agent.ppo.learning_rate == 1.0e-3
     assert cfg.agent.estimation.learning_rate == 1.0e-3
+    assert not cfg.agent.estimation.actor_uses_phase
     assert cfg.env.rewards.k == 0.2
     assert cfg.env.rewards.quiet_ramp == (0.0, 0.0)
     assert cfg.env.rewards.phase_source == "estimated"

@@ -16,6 +16,7 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from envs.rewards import TERMS
 from mute.checkpoint import load_checkpoint, save_checkpoint
+from mute.command_lines import train
 from mute.command_lines.train import main
 from mute.config import from_plain
 from mute.errors import run_cli
@@ -111,14 +112,14 @@ def test_it_leaves_parameters_curves_and_checkpoints(finished):
 def test_options_arrive_in_the_written_parameters_from_which_the_run_is_re_made(finished):
     run, _ = finished
     written = yaml.safe_load((run / "config.yaml").read_text())
-    assert written.pop("command").startswith("python train.py --plain --task go1_mute")
-    assert written.pop("task") == "go1_mute"
+    assert written["command"].startswith("python train.py --plain --task go1_mute")
+    assert written["task"] == "go1_mute"
     expected = make_task("go1_mute")
     expected.env.num_envs, expected.env.seed = 32, 5
     expected.env.rewards.k, expected.env.rewards.quiet_ramp = 0.3, (0.0, 1.0)
     expected.agent.iterations, expected.agent.save_interval = 3, 2
     expected.agent.estimation.network.lstm_hidden = 24
-    assert from_plain(written) == expected
+    assert from_plain({name: written[name] for name in ("env", "agent")}) == expected
     assert from_plain(load_checkpoint(run / "model_2.pt")["config"]) == expected
 
 
@@ -316,3 +317,20 @@ def test_help_is_no_mistake(capsys):
         run_cli(lambda: main(["--help"]))
     assert stop.value.code == 0
     assert "--num-envs" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("device", "options", "expected"),
+    [
+        ("cpu", [], 1024),
+        ("cuda", [], 4096),
+        ("cuda", ["--num-envs", "7"], 7),
+        ("cuda", ["--env.num-envs", "1024"], 1024),
+    ],
+)
+def test_the_number_of_robots_suits_the_device_unless_it_is_given(
+    monkeypatch, device, options, expected
+):
+    monkeypatch.setattr(train, "resolve_device", lambda _: device)
+    args, _ = train._arguments(options)
+    assert train._configuration(args).env.num_envs == expected
