@@ -401,6 +401,7 @@ class QuadrupedEnv(VecEnv):
             push = 2.0 * torch.rand(self.num_envs, 2, generator=self.generator) - 1.0
             push *= cfg.push_velocity * due.unsqueeze(1)
             self.simulation.qvel[:, :2] += push
+            self._read_state()  # the critic and the estimator's label know of the push
 
     def _observe(self) -> None:
         policy = policy_observation(

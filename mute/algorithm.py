@@ -17,7 +17,7 @@ __all__ = ["EstimatorPPO"]
 
 
 class EstimatorPPO(PPO):
-    """PPO whose update first trains the estimator on the stored rollout.
+    """PPO whose update first trains the estimator, on the rollout before the stored one.
 
     The actor and the critic read the estimates as they were stored, so the probability ratio is 1
     on the first mini-batch, and no gradient of theirs reaches the estimator.

@@ -25,6 +25,7 @@ import torch
 from mjbatch import Batch
 from rich.progress import track
 from rsl_rl.algorithms import PPO
+from rsl_rl.utils import check_nan
 
 from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
 from mute.command_lines.arguments import command_line, parse
@@ -190,7 +191,9 @@ def _collection(runner: MuteRunner, steps: int) -> Callable[[], None]:
         for _ in range(steps):
             actions = algorithm.act(observations)
             observations, rewards, dones, extras = env.step(actions)
+            check_nan(observations, rewards, dones)
             algorithm.process_env_step(observations, rewards, dones, extras)
+            runner.logger.process_env_step(rewards, dones, extras)
         algorithm.compute_returns(observations)
 
     return run

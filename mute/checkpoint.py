@@ -84,7 +84,7 @@ def load_checkpoint(path: Path, map_location: str | torch.device = "cpu") -> dic
         if isinstance(error, pickle.UnpicklingError) and _holds_code(path):
             raise _code_refused(path) from None
         raise CheckpointError(
-            f"{path} is not a readable checkpoint: {_first_line(error)}"
+            f"{path} is not a readable checkpoint: {first_line(error)}"
         ) from error
     if not isinstance(content, dict) or content.get("format") != _FORMAT:
         raise CheckpointError(f"{path} was written by another program, not a MUTE checkpoint")
@@ -211,6 +211,7 @@ def _code_refused(path: Path) -> CheckpointError:
     return CheckpointError(f"{path} holds code, refused: loading it could run anything")
 
 
-def _first_line(error: Exception) -> str:
+def first_line(error: Exception) -> str:
+    """Return the first line of an error's message, or its type where it has none."""
     lines = str(error).strip().splitlines()
     return lines[0] if lines else type(error).__name__

@@ -13,6 +13,7 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from mute.threads import use_learning_threads
 from networks.estimator import Estimate, Estimator, State
 
 __all__ = ["EstimatedEnv", "estimate_group"]
@@ -109,6 +110,7 @@ class EstimatedEnv(VecEnv):
         new estimate, or the stored rollout could not be reproduced. The loop holds a reference to
         the group's tensor, so here alone it is overwritten.
         """
+        use_learning_threads()  # products differ in the last bit with the number of threads
         published = self._observations["estimate"]
         self._estimate, self.state = self.estimator.step(
             self._observations["policy"], self.state_before
@@ -130,6 +132,7 @@ class EstimatedEnv(VecEnv):
         """
         self.env.load_state_dict(state["env"])
         hidden, cell = (part.to(self.device) for part in state["state_before"])
+        use_learning_threads()  # as in `refresh`, whose estimate this makes again
         self._consume(self.env.get_observations(), (hidden, cell))
 
     @torch.no_grad()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import platform
 from pathlib import Path
 
 import git
 import torch
+
+from mute.threads import usable_cores
 
 __all__ = ["current_commit", "machine_kind"]
 
@@ -20,7 +21,7 @@ def current_commit() -> str:
         repository = git.Repo(_REPOSITORY)
         suffix = "-dirty" if repository.is_dirty() else ""
         return f"{repository.head.commit.hexsha}{suffix}"
-    except (git.InvalidGitRepositoryError, ValueError):
+    except (git.GitError, ValueError):
         return "unknown"
 
 
@@ -32,7 +33,5 @@ def machine_kind() -> str:
         lines = cpu_info.read_text().splitlines()
         names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
         processor = names[0] if names else processor
-    affinity = getattr(os, "sched_getaffinity", None)
-    cores = len(affinity(0)) if affinity else os.cpu_count()
-    kind = f"{processor}, {cores} cores"
+    kind = f"{processor}, {usable_cores()} cores"
     return f"{kind}, {torch.cuda.get_device_name()}" if torch.cuda.is_available() else kind

@@ -10,6 +10,7 @@ from mute.threads import configure_threads
 
 configure_threads()  # before torch is imported
 
+import shlex
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -71,7 +72,8 @@ def _training(path: Path, checkpoint: dict[str, Any]) -> dict[str, Any]:
         raise CheckpointError(f"{path} lies outside its run: no {parameters}") from error
     return {
         "task": checkpoint["task"],
-        "command": run["command"],
+        "command": _without_places(run["command"]),
+        "resumed": [_without_places(entry["command"]) for entry in run.get("resumed", [])],
         "seed": checkpoint["config"]["env"]["seed"],
         "commit": run["commit"],
         "machine": run["machine"],
@@ -79,6 +81,19 @@ def _training(path: Path, checkpoint: dict[str, Any]) -> dict[str, Any]:
         "steps": checkpoint["logger"]["total_steps"],
         "wall_time_minutes": round(checkpoint["logger"]["total_time"] / 60.0, 1),
     }
+
+
+def _without_places(command: str) -> str:
+    """Return a command without the options that name files of the machine it ran on."""
+    words, kept = iter(shlex.split(command)), []
+    for word in words:
+        if word in ("--log-dir", "--run-name"):
+            next(words, None)
+        elif word == "--resume":
+            kept += [word, Path(next(words, "")).name]
+        else:
+            kept.append(word)
+    return shlex.join(kept)
 
 
 def _figures(policy: Path) -> dict[str, Any]:

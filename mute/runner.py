@@ -16,7 +16,7 @@ from rsl_rl.runners import OnPolicyRunner
 from envs.observations import OBS_DIM
 from envs.quadruped_env import QuadrupedEnv
 from mute.algorithm import EstimatorPPO
-from mute.checkpoint import CheckpointError, load_checkpoint, save_checkpoint
+from mute.checkpoint import CheckpointError, first_line, load_checkpoint, save_checkpoint
 from mute.config import TaskCfg, to_plain
 from mute.estimated_env import EstimatedEnv
 from mute.estimation import EstimatorTrainer
@@ -140,17 +140,19 @@ class MuteRunner(OnPolicyRunner):
         Raises:
             CheckpointError: If it is damaged, foreign, or of another configuration.
         """
-        checkpoint = load_checkpoint(Path(path), map_location or self.device)
+        # On the CPU whatever the device: the simulation lives there, and networks and optimisers
+        # move what they load to where they are.
+        checkpoint = load_checkpoint(Path(path), map_location or "cpu")
         try:
             self.alg.load(checkpoint, load_cfg, strict)
             self.env.load_state_dict(checkpoint["env"])
             self.logger.load_state_dict(checkpoint["logger"])
-            torch.set_rng_state(checkpoint["torch_random_state"].cpu())
+            torch.set_rng_state(checkpoint["torch_random_state"])
             # A run that moves to a GPU has no state to go on from there.
             if self._on_cuda and checkpoint["cuda_random_state"] is not None:
-                torch.cuda.set_rng_state(checkpoint["cuda_random_state"].cpu(), self.device)
-        except (KeyError, TypeError, ValueError, RuntimeError) as error:
-            reason = str(error).strip().splitlines()[0]
+                torch.cuda.set_rng_state(checkpoint["cuda_random_state"], self.device)
+        except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
+            reason = first_line(error)
             raise CheckpointError(f"{path} does not fit this configuration: {reason}") from error
         # The saved iteration is finished.
         self.current_learning_iteration = checkpoint["iter"] + 1

@@ -20,6 +20,7 @@ from mute.controllers.learned import Policy
 from mute.errors import MuteError
 from mute.evaluation.estimation_errors import EstimationMeter
 from mute.evaluation.matched_speed import sweep_beta_at_speed
+from mute.evaluation.progress import Milestone, checkpoints_of, training_minutes, walks
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.trials import evaluation_cfg, run_trial
 from mute.provenance import machine_kind
@@ -52,6 +53,24 @@ class GaitArgs:
     """Directory of the CSV and JSON files."""
 
 
+@dataclass
+class ProgressArgs:
+    """Measure a run's checkpoints over the command range until one walks."""
+
+    run: Path
+    """Directory of the run."""
+    trials: int = 256
+    """Robots that walk, each with its own command and beta."""
+    seconds: float = 20.0
+    """Length of a trial, s."""
+    randomized: bool = False
+    """Keep the training's randomised physics, pushes and sensor noise."""
+    seed: int = 1
+    """Seed of initial states and commands."""
+    out: Path = Path("evaluation")
+    """Directory of the CSV and JSON files."""
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status.
 
@@ -62,17 +81,47 @@ def main(argv: Sequence[str] | None = None) -> int:
     if argv[:1] in (["-h"], ["--help"]):
         print(_USAGE)
         return 0
-    if argv[:1] != ["gait"]:
-        raise MuteError(f"the first argument must be gait, got {argv[0] if argv else 'nothing'}")
-    _gait(parse(GaitArgs, argv[1:], GaitArgs.__doc__ or ""))
+    if argv[:1] == ["gait"]:
+        _gait(parse(GaitArgs, argv[1:], GaitArgs.__doc__ or ""))
+    elif argv[:1] == ["progress"]:
+        _progress(parse(ProgressArgs, argv[1:], ProgressArgs.__doc__ or ""))
+    else:
+        given = argv[0] if argv else "nothing"
+        raise MuteError(f"the first argument must be gait or progress, got {given}")
     return 0
 
 
-_USAGE = """usage: evaluate.py gait [options]
+_USAGE = """usage: evaluate.py {gait,progress} [options]
 
-gait   walk over the command range, and at one actual speed for several betas
+gait       walk over the command range, and at one actual speed for several betas
+progress   measure a run's checkpoints until one walks
 
-`evaluate.py gait --help` lists the options."""
+`evaluate.py gait --help` lists the options of gait, and so on."""
+
+
+def _progress(args: ProgressArgs) -> None:
+    if args.trials < 1:
+        raise MuteError(f"--trials must be >= 1, got {args.trials}")
+    if not args.seconds > 1.0:
+        raise MuteError(f"--seconds must be > 1, got {args.seconds:g}")
+    torch.set_num_threads(1)  # the physics engine has the cores
+    rows: list[dict[str, Any]] = []
+    for path in track(checkpoints_of(args.run), "checkpoints"):
+        policy, minutes = load_policy(path), training_minutes(path)
+        env = _environment(policy, args.trials, args.seconds, args.seed, args.randomized)
+        draw = _draw_commands(env, args.seed)
+        steps = round(args.seconds / env.step_dt)
+        gait = run_trial(env, LearnedController(policy, env.num_envs), draw.command, steps).gait()
+        error, falls = gait.velocity_error_sq, gait.fall_rate
+        milestone = Milestone(policy.iteration, minutes, error, falls, walks(error, falls))
+        rows.append(dataclasses.asdict(milestone))
+        if milestone.walks:
+            break
+    print_table(f"{args.trials} trials of {args.seconds:g} s", rows, list(rows[0]))
+    write_csv(args.out / "progress.csv", rows)
+    summary = {"machine": machine_kind(), "trials": args.trials, "checkpoints": rows}
+    write_json(args.out / "progress.json", summary)
+    print(f"written: {args.out}/progress.json, progress.csv")
 
 
 def _gait(args: GaitArgs) -> None:
@@ -108,14 +157,8 @@ def _gait(args: GaitArgs) -> None:
 
 def _over_range(args: GaitArgs, policy: Policy, beta: float) -> dict[str, Any]:
     """Return the figures of one beta over the task's whole command range."""
-    env = _environment(args, policy, args.trials)
-    draw = CommandSampler(
-        env.cfg.commands,
-        env.num_envs,
-        torch.Generator().manual_seed(args.seed),
-        torch.device("cpu"),
-    )
-    draw.resample(torch.ones(env.num_envs, dtype=torch.bool), with_beta=True)
+    env = _environment(policy, args.trials, args.seconds, args.seed, args.randomized)
+    draw = _draw_commands(env, args.seed)
     draw.command[:, BETA] = beta
     controller = LearnedController(policy, env.num_envs)
     estimation = EstimationMeter(env, controller)
@@ -126,16 +169,26 @@ def _over_range(args: GaitArgs, policy: Policy, beta: float) -> dict[str, Any]:
 
 def _at_speed(args: GaitArgs, policy: Policy) -> list[dict[str, float]]:
     robots = max(_SWEEP_ROBOTS, 12 * len(args.beta))
-    env = _environment(args, policy, robots)
+    env = _environment(policy, robots, args.seconds, args.seed, args.randomized)
     # All walk straight ahead, from the stance: only speed and beta differ.
     controller = LearnedController(policy, robots)
     steps = round(args.seconds / env.step_dt)
     return sweep_beta_at_speed(env, controller, args.speed, args.beta, steps)
 
 
-def _environment(args: GaitArgs, policy: Policy, num_envs: int) -> QuadrupedEnv:
-    cfg = evaluation_cfg(policy.cfg.env, num_envs, args.seconds, args.seed, args.randomized)
+def _environment(
+    policy: Policy, num_envs: int, seconds: float, seed: int, randomized: bool
+) -> QuadrupedEnv:
+    cfg = evaluation_cfg(policy.cfg.env, num_envs, seconds, seed, randomized)
     return QuadrupedEnv(dataclasses.replace(cfg, num_threads=0))
+
+
+def _draw_commands(env: QuadrupedEnv, seed: int) -> CommandSampler:
+    """Return commands drawn from the task's whole range, beta included."""
+    generator = torch.Generator().manual_seed(seed)
+    draw = CommandSampler(env.cfg.commands, env.num_envs, generator, torch.device("cpu"))
+    draw.resample(torch.ones(env.num_envs, dtype=torch.bool), with_beta=True)
+    return draw
 
 
 def _check(args: GaitArgs) -> None:

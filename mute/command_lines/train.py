@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import shlex
 import sys
 import time
@@ -156,12 +157,21 @@ def _new_run(args: TrainArgs) -> Path:
 
 
 def _write_parameters(run_dir: Path, args: TrainArgs, cfg: TaskCfg, argv: Sequence[str]) -> None:
-    """Write what the run is re-made from, before it starts."""
-    content = {
+    """Write what the run is re-made from, before it starts or goes on.
+
+    The command that started it stays; those that went on are listed under `resumed`.
+    """
+    path = run_dir / _PARAMETERS
+    origin: dict[str, Any] = {
         "command": shlex.join(["python", "train.py", *argv]),
-        "task": args.task,
         "commit": current_commit(),
         "machine": machine_kind(),
-        **to_plain(cfg),
     }
-    (run_dir / _PARAMETERS).write_text(yaml.safe_dump(content, sort_keys=False))
+    if args.resume is not None and path.exists():
+        before = yaml.safe_load(path.read_text())
+        resumed = [*before.get("resumed", []), origin]
+        origin = {name: before.get(name) for name in origin} | {"resumed": resumed}
+    content = {"task": args.task, **origin, **to_plain(cfg)}
+    temporary = path.with_suffix(".tmp")
+    temporary.write_text(yaml.safe_dump(content, sort_keys=False))
+    os.replace(temporary, path)

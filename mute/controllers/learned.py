@@ -11,7 +11,7 @@ from tensordict import TensorDict
 
 from envs.observations import OBS_DIM
 from envs.quadruped_env import NUM_ACTIONS
-from mute.checkpoint import CheckpointError, load_checkpoint
+from mute.checkpoint import CheckpointError, first_line, load_checkpoint
 from mute.config import TaskCfg, from_plain
 from mute.estimated_env import estimate_group
 from networks.estimator import Estimate, Estimator
@@ -51,7 +51,7 @@ def load_policy(path: Path) -> Policy:
         actor.load_state_dict(saved["actor_state_dict"])
         policy = Policy(saved["task"], cfg, saved["iter"], estimator.eval(), actor.eval())
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        reason = str(error).strip().splitlines()[0]
+        reason = first_line(error)
         raise CheckpointError(f"{path} holds no policy that fits this version: {reason}") from error
     return policy
 
