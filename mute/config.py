@@ -171,13 +171,25 @@ class TaskCfg:
     """Learning."""
 
     def __post_init__(self) -> None:
-        """Check what the environment leaves to torch.
+        """Check what neither part can know alone, and what the environment leaves to torch.
 
         Raises:
-            ValueError: If the seed is none that torch takes.
+            ValueError: If the seed is none that torch takes, or mini-batches would be empty.
         """
         if not 0 <= self.env.seed < 2**63:
             raise ValueError(f"env.seed must be in [0, 2^63), got {self.env.seed}")
+        num_envs, agent = self.env.num_envs, self.agent
+        samples = num_envs * agent.num_steps_per_env
+        if agent.ppo.num_mini_batches > samples:
+            raise ValueError(
+                "agent.ppo.num_mini_batches must be <= env.num_envs * agent.num_steps_per_env = "
+                f"{samples}, got {agent.ppo.num_mini_batches}"
+            )
+        if agent.estimation.num_mini_batches > num_envs:
+            raise ValueError(
+                f"agent.estimation.num_mini_batches must be <= env.num_envs = {num_envs}, "
+                f"got {agent.estimation.num_mini_batches}"
+            )
 
 
 def to_plain(cfg: TaskCfg) -> dict[str, Any]:

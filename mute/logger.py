@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -184,7 +185,10 @@ class PlainDisplay:
 
 
 def _drop_from(path: Path, first_iteration: int) -> None:
-    """Keep the lines before an iteration; a line that a killed process cut short goes as well."""
+    """Keep the lines before an iteration; a line that a killed process cut short goes as well.
+
+    The new file takes the place of the old one whole, so that a full disk costs no curves.
+    """
     if not path.exists():
         return
     kept = []
@@ -192,7 +196,13 @@ def _drop_from(path: Path, first_iteration: int) -> None:
         with contextlib.suppress(ValueError):
             if json.loads(line)["iteration"] < first_iteration:
                 kept.append(line)
-    path.write_text("".join(kept))
+    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_text("".join(kept))
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
 
 
 def _figures(scalars: dict[str, float]) -> RenderableType:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import shlex
 import sys
 import time
@@ -16,6 +17,7 @@ import torch
 import yaml
 
 from envs.quadruped_env import QuadrupedEnvCfg
+from envs.scene import SceneError
 from mute.checkpoint import CheckpointError, latest_checkpoint, load_checkpoint
 from mute.command_lines.arguments import command_line, parse, resolve_device, selected_task
 from mute.config import AgentCfg, TaskCfg, from_plain, to_plain
@@ -73,7 +75,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     torch.set_float32_matmul_precision(cfg.agent.matmul_precision)
     run_dir = checkpoint.parent if checkpoint else _new_run(args)
     display = PlainDisplay() if args.plain else LiveDisplay(args.task)
-    runner = MuteRunner(args.task, cfg, run_dir, device, display.update)
+    try:
+        runner = MuteRunner(args.task, cfg, run_dir, device, display.update)
+    except (ValueError, SceneError) as error:
+        raise MuteError(str(error)) from error
     if checkpoint:
         runner.load(str(checkpoint))
         if runner.current_learning_iteration >= cfg.agent.iterations:
@@ -81,6 +86,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 f"{checkpoint} has finished its {cfg.agent.iterations} iterations; "
                 "ask for more with --iterations"
             )
+    _make_directory(run_dir)
     _write_parameters(run_dir, args, cfg, argv)
     print(f"run: {run_dir}", file=sys.stderr)
     with display:
@@ -114,7 +120,29 @@ def _arguments(argv: Sequence[str]) -> tuple[TrainArgs, Path | None]:
         cfg = from_plain(saved.get("config"))
     except ValueError as error:
         raise CheckpointError(f"{path}: {error}") from error
-    return _parse(argv, task, cfg), path
+    args = _parse(argv, task, cfg)
+    _check_resume(args, path, cfg.env.seed, saved["iter"])
+    return args, path
+
+
+def _check_resume(args: TrainArgs, path: Path, seed: int, iteration: int) -> None:
+    """Refuse options that cannot have an effect, and a checkpoint that later ones follow."""
+    asked = args.env.seed if args.seed is None else args.seed
+    if asked != seed:
+        raise MuteError(
+            f"--seed {asked}: a resumed run goes on with its own seed {seed}; leave --seed away"
+        )
+    if args.run_name:
+        raise MuteError(
+            f"--run-name {args.run_name}: a resumed run keeps its name; leave --run-name away"
+        )
+    matches = (re.fullmatch(r"model_(\d+)\.pt", file.name) for file in path.parent.iterdir())
+    newest = max((int(match[1]) for match in matches if match), default=iteration)
+    if newest > iteration:
+        raise MuteError(
+            f"{path} is not the newest checkpoint of its run: resume "
+            f"{path.with_name(f'model_{newest}.pt')}, or delete or move away the later ones"
+        )
 
 
 def _parse(argv: Sequence[str], task: str, cfg: TaskCfg) -> TrainArgs:
@@ -140,8 +168,9 @@ def _configuration(args: TrainArgs) -> TaskCfg:
 
 
 def _new_run(args: TrainArgs) -> Path:
+    """Return the directory of a new run, which is made once everything else has gone well."""
     name = args.run_name or time.strftime("%Y-%m-%d_%H-%M-%S")
-    if Path(name).name != name:
+    if Path(name).name != name or name == "..":
         raise MuteError(f"--run-name must be a plain name without '/', got {name!r}")
     run_dir = args.log_dir / args.task / name
     if (run_dir / _PARAMETERS).exists() or list(run_dir.glob("model_*.pt")):
@@ -149,11 +178,14 @@ def _new_run(args: TrainArgs) -> Path:
             f"{run_dir} holds a run already: choose another --run-name, or go on with "
             f"--resume {run_dir}/model_N.pt"
         )
+    return run_dir
+
+
+def _make_directory(run_dir: Path) -> None:
     try:
         run_dir.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise MuteError(f"--log-dir: cannot make {run_dir}: {error.strerror}") from error
-    return run_dir
 
 
 def _write_parameters(run_dir: Path, args: TrainArgs, cfg: TaskCfg, argv: Sequence[str]) -> None:

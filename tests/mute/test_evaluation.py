@@ -22,6 +22,7 @@ from mute.errors import MuteError
 from mute.evaluation.estimation_errors import EstimationMeter
 from mute.evaluation.gait import Gait
 from mute.evaluation.matched_speed import figures_at_speed, sweep_beta_at_speed
+from mute.evaluation.progress import walks
 from mute.evaluation.tables import read_json, write_csv, write_json
 from mute.evaluation.trials import evaluation_cfg, run_trial
 from mute.runner import policy_part
@@ -177,3 +178,27 @@ def test_evaluate_gait_writes_its_figures(policy_path, tmp_path, capsys):
 def test_evaluate_refuses_bad_input_by_name(arguments, names):
     with pytest.raises(MuteError, match=names):
         evaluate.main(arguments)
+
+
+def test_progress_measures_the_checkpoints_of_a_run_in_their_order(tmp_path):
+    runner = make_runner(tmp_path, iterations=2)
+    runner.train()
+    out = tmp_path / "figures"
+    arguments = ["progress", "--run", str(tmp_path), "--trials", "2", "--seconds", "1.2"]
+    assert evaluate.main([*arguments, "--out", str(out)]) == 0
+    rows = read_json(out / "progress.json")["checkpoints"]
+    assert [row["iteration"] for row in rows] == [0, 1]
+    assert 0.0 < rows[0]["minutes"] < rows[1]["minutes"]
+    assert not any(row["walks"] for row in rows)  # nothing walks after two iterations
+
+
+@pytest.mark.parametrize(
+    ("error", "falls", "walking"), [(0.049, 0.009, True), (0.05, 0.0, False), (0.0, 0.01, False)]
+)
+def test_a_walk_tracks_and_does_not_fall(error, falls, walking):
+    assert walks(error, falls) is walking
+
+
+def test_progress_refuses_a_directory_without_checkpoints(tmp_path):
+    with pytest.raises(MuteError, match="no checkpoint"):
+        evaluate.main(["progress", "--run", str(tmp_path)])
