@@ -5,6 +5,7 @@ The layouts are data: other code finds a part of a group by its name, never by a
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import torch
@@ -59,10 +60,11 @@ class ObservationsCfg:
     """Factor on all noise; 0 switches it off."""
 
     def __post_init__(self) -> None:
-        """Check the names.
+        """Check the names and the values.
 
         Raises:
-            ValueError: If a scale is missing or a part is unknown.
+            ValueError: If a scale is missing, a part is unknown, a value is not finite, or noise is
+                negative.
         """
         if set(self.scales) != set(OBSERVATION_WIDTHS):
             raise ValueError(
@@ -74,6 +76,13 @@ class ObservationsCfg:
                 f"observations.noise must name parts of {list(OBSERVATION_WIDTHS)}, "
                 f"got {sorted(unknown)}"
             )
+        for name, value in self.scales.items():
+            if not math.isfinite(value):
+                raise ValueError(f"observations.scales.{name} must be finite, got {value}")
+        noise = {f"noise.{name}": value for name, value in self.noise.items()}
+        for name, value in (noise | {"noise_level": self.noise_level}).items():
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"observations.{name} must be >= 0 and finite, got {value}")
 
 
 def slices(widths: dict[str, int]) -> dict[str, slice]:

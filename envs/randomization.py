@@ -6,6 +6,7 @@ stay a thousand robots for a whole training.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -13,6 +14,9 @@ import torch
 from envs.simulation import Simulation
 
 __all__ = ["RandomizationCfg", "randomize_physics"]
+
+_TRUNK_MASS = 5.204
+"""Mass of the trunk before anything is added, kg; a configuration is checked without the model."""
 
 
 @dataclass
@@ -30,7 +34,7 @@ class RandomizationCfg:
     gain_scale: tuple[float, float] = (0.9, 1.1)
     """Factor on Kp and on Kd, drawn separately for each joint."""
     friction_loss: tuple[float, float] = (0.0, 0.5)
-    """Dry friction of the joints, N m (go1_figures: published models lie between 0.1 and 1.0)."""
+    """Dry friction of the joints, N m (published models lie between 0.1 and 1.0)."""
     push_interval: float = 8.0
     """Time between pushes, s; 0 for none."""
     push_velocity: float = 0.4
@@ -44,15 +48,23 @@ class RandomizationCfg:
         """
         for name in ("friction", "added_mass", "com_offset", "gain_scale", "friction_loss"):
             low, high = getattr(self, name)
-            if not low <= high:
+            if not -math.inf < low <= high < math.inf:
                 raise ValueError(
-                    f"randomization.{name} must be (low, high) with low <= high, got {(low, high)}"
+                    f"randomization.{name} must be (low, high) with low <= high, both finite, "
+                    f"got {(low, high)}"
                 )
         for name in ("friction", "gain_scale", "friction_loss"):
             if getattr(self, name)[0] < 0.0:
                 raise ValueError(f"randomization.{name} must be >= 0, got {getattr(self, name)}")
-        if self.push_interval < 0.0:
-            raise ValueError(f"randomization.push_interval must be >= 0, got {self.push_interval}")
+        if self.added_mass[0] <= -_TRUNK_MASS:
+            raise ValueError(
+                f"randomization.added_mass must be > {-_TRUNK_MASS}, or nothing is left of the "
+                f"trunk, got {self.added_mass}"
+            )
+        for name in ("push_interval", "push_velocity"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"randomization.{name} must be >= 0 and finite, got {value}")
 
 
 PHYSICS_DIM = 5

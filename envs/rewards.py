@@ -6,6 +6,7 @@ sum is r = beta r_phase + (1 - k beta) r_task + r_other (paper, eq. 6).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 
@@ -135,6 +136,10 @@ class RewardsCfg:
             raise ValueError(
                 f"rewards.phase_source must be 'estimated' or 'true', got {self.phase_source!r}"
             )
+        for name, value in vars(self).items():
+            numbers = value if isinstance(value, tuple | list) else (value,)
+            if name != "phase_source" and not all(map(math.isfinite, numbers)):
+                raise ValueError(f"rewards.{name} must be finite, got {value}")
         if not 0.0 <= self.k <= 1.0:
             raise ValueError(f"rewards.k must be in [0, 1], got {self.k}")
         for name in ("quiet_ramp", "lift_ramp"):

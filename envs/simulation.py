@@ -158,6 +158,8 @@ class BatchSimulation:
         """Return all that is needed to continue bit for bit."""
         state = {f"field/{name}": value.clone() for name, value in self._fields.items()}
         state["integration"] = torch.from_numpy(self._state.copy())
+        # A push written since the last step reaches the engine's own state in the next one only.
+        state["qpos"], state["qvel"] = self.qpos.clone(), self.qvel.clone()
         return state
 
     def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
@@ -180,6 +182,8 @@ class BatchSimulation:
         self._batch.forward()
         # The solver's warm start is part of the state, and `forward` has just moved it.
         self._state[:] = integration
+        self.qpos.copy_(state["qpos"])
+        self.qvel.copy_(state["qvel"])
         self._failed[:] = False
 
     def _bind(self, name: str) -> torch.Tensor:

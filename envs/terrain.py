@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -20,14 +21,21 @@ class HeightMapCfg:
     spacing: float = 0.15
     """Distance between neighbours, m."""
 
-    def grid(self) -> torch.Tensor:
-        """Return the grid points in the heading frame, m. Shape: (num_points, 2).
+    def __post_init__(self) -> None:
+        """Check the lengths.
 
         Raises:
-            ValueError: If the spacing is not positive.
+            ValueError: If the spacing is not positive, an extent is negative, or one is infinite.
         """
-        if self.spacing <= 0.0:
-            raise ValueError(f"height_map.spacing must be > 0, got {self.spacing}")
+        if not (math.isfinite(self.spacing) and self.spacing > 0.0):
+            raise ValueError(f"height_map.spacing must be > 0 and finite, got {self.spacing}")
+        for name in ("length", "width"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"height_map.{name} must be >= 0 and finite, got {value}")
+
+    def grid(self) -> torch.Tensor:
+        """Return the grid points in the heading frame, m. Shape: (num_points, 2)."""
         along = _centred(self.length, self.spacing)
         across = _centred(self.width, self.spacing)
         return torch.cartesian_prod(along, across)

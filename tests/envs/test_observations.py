@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 import torch
 
@@ -91,3 +93,18 @@ def test_a_missing_scale_is_refused():
 def test_noise_on_an_unknown_part_is_refused():
     with pytest.raises(ValueError, match="joint_torque"):
         ObservationsCfg(noise={"joint_torque": 1.0})
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -0.1])
+def test_noise_that_is_no_size_is_refused_by_name(value):
+    with pytest.raises(ValueError, match=rf"observations\.noise_level must be .*got {value}"):
+        ObservationsCfg(noise_level=value)
+    with pytest.raises(ValueError, match=rf"observations\.noise\.joint_vel must be .*got {value}"):
+        ObservationsCfg(noise={"joint_vel": value})
+
+
+@pytest.mark.parametrize("value", [math.nan, -math.inf])
+def test_a_scale_that_is_not_finite_is_refused_by_name(value):
+    scales = dict.fromkeys(OBSERVATION_WIDTHS, 1.0) | {"command": value}
+    with pytest.raises(ValueError, match=rf"observations\.scales\.command must be .*got {value}"):
+        ObservationsCfg(scales=scales)

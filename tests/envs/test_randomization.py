@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 import torch
 
@@ -150,9 +152,25 @@ def test_the_seed_decides_the_physics():
         ("com_offset", (0.1, -0.1)),
         ("gain_scale", (-1.0, 1.0)),
         ("friction_loss", (-0.1, 0.1)),
+        ("friction", (0.5, math.inf)),
+        ("com_offset", (math.nan, 0.0)),
+        ("added_mass", (-math.inf, 0.0)),
+        ("added_mass", (-5.204, 0.0)),
         ("push_interval", -1.0),
+        ("push_interval", math.nan),
+        ("push_velocity", -0.1),
+        ("push_velocity", math.nan),
+        ("push_velocity", math.inf),
     ],
 )
 def test_a_bad_field_is_refused_by_name(field, value):
     with pytest.raises(ValueError, match=f"randomization.{field}"):
         RandomizationCfg(**{field: value})
+
+
+def test_the_trunk_may_lose_all_but_a_little_of_its_mass():
+    # The bound above is the mass of the model.
+    assert MODEL.body_mass[TRUNK] == pytest.approx(5.204)
+    simulation, _ = _randomize(added_mass=(-5.2, -5.2))
+    mass = simulation.field("body_mass")[:, TRUNK].double()
+    torch.testing.assert_close(mass, torch.full_like(mass, 0.004), atol=1e-6, rtol=0.0)

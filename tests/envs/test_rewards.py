@@ -259,6 +259,12 @@ def test_a_reward_is_not_changed_by_the_next_call():
         ("desired_height", 0.0),
         ("clearance_target", -0.1),
         ("apex_target", 0.0),
+        ("apex_target", math.inf),
+        ("desired_height", math.nan),
+        ("landing_speed", math.nan),
+        ("lin_vel_tracking", math.inf),
+        ("collision", -math.inf),
+        ("lift_ramp", (0.0, math.inf)),
     ],
 )
 def test_a_bad_constant_is_refused_by_name(field, value):

@@ -35,9 +35,26 @@ def test_the_grid_runs_across_first_and_then_along():
     torch.testing.assert_close(grid, torch.tensor(expected))
 
 
-def test_a_grid_without_spacing_is_refused():
-    with pytest.raises(ValueError, match=r"height_map.spacing"):
-        HeightMapCfg(spacing=0.0).grid()
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("spacing", 0.0),
+        ("spacing", -0.1),
+        ("spacing", math.nan),
+        ("spacing", math.inf),
+        ("length", -0.1),
+        ("length", math.nan),
+        ("width", -0.1),
+        ("width", math.inf),
+    ],
+)
+def test_a_bad_grid_is_refused_by_name_with_its_value(field, value):
+    with pytest.raises(ValueError, match=rf"height_map\.{field} must be .*got {value}"):
+        HeightMapCfg(**{field: value})
+
+
+def test_a_grid_without_extent_is_the_point_under_the_trunk():
+    assert torch.equal(HeightMapCfg(length=0.0, width=0.0).grid(), torch.zeros(1, 2))
 
 
 def test_flat_ground_is_at_zero_everywhere():

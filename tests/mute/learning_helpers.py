@@ -7,7 +7,10 @@ from typing import Any
 
 import torch
 
+from envs.commands import CommandsCfg
 from envs.quadruped_env import QuadrupedEnvCfg
+from envs.randomization import RandomizationCfg
+from envs.rewards import RewardsCfg
 from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg
 from mute.runner import MuteRunner
 from networks.estimator import EstimatorCfg
@@ -17,11 +20,22 @@ NUM_STEPS = 8
 
 
 def make_cfg(iterations: int = 2, **env: Any) -> TaskCfg:
-    """Return a task whose episodes (5 steps) end inside its rollouts (8 steps)."""
+    """Return a task whose episodes (5 steps) end inside its rollouts (8 steps).
+
+    Its curricula all ramp over the first 40 steps, and within an episode every second step brings
+    new commands and every third a push: what a checkpoint forgets of them shows.
+    """
+    ramp = (0.0, 0.8)
+    curricula: dict[str, Any] = {
+        "rewards": RewardsCfg(quiet_ramp=ramp, lift_ramp=ramp, foot_slip=-0.04, stand_still=-0.1),
+        "commands": CommandsCfg(initial_share=0.2, ramp=ramp, resampling_time=0.04),
+        "randomization": RandomizationCfg(push_interval=0.06),
+    }
     network = EstimatorCfg(
         lstm_hidden=16, latent_dim=4, decoder_hidden=(8,), phase_hidden=(8,), activation="elu"
     )
-    settings = {"num_envs": NUM_ENVS, "num_threads": 1, "episode_length": 0.1, "seed": 3} | env
+    settings = {"num_envs": NUM_ENVS, "num_threads": 1, "episode_length": 0.1, "seed": 3}
+    settings |= curricula | env
     return TaskCfg(
         env=QuadrupedEnvCfg(**settings),
         agent=AgentCfg(

@@ -109,3 +109,20 @@ def test_a_bad_value_is_refused_with_the_fields_name_and_the_value(cls, field, v
 def test_a_seed_that_torch_does_not_take_is_refused(seed):
     with pytest.raises(ValueError, match=r"env\.seed"):
         TaskCfg(env=QuadrupedEnvCfg(seed=seed))
+
+
+def test_more_mini_batches_than_samples_are_refused():
+    env = QuadrupedEnvCfg(num_envs=4)
+    estimation = EstimationCfg(num_mini_batches=4)
+    most = AgentCfg(num_steps_per_env=3, ppo=PPOCfg(num_mini_batches=12), estimation=estimation)
+    TaskCfg(env, most)
+    with pytest.raises(ValueError, match=r"agent\.ppo\.num_mini_batches must be <= .* 12, got 13"):
+        TaskCfg(env, dataclasses.replace(most, ppo=PPOCfg(num_mini_batches=13)))
+
+
+def test_more_mini_batches_of_the_estimator_than_robots_are_refused():
+    env = QuadrupedEnvCfg(num_envs=4)
+    TaskCfg(env, AgentCfg(estimation=EstimationCfg(num_mini_batches=4)))
+    words = r"agent\.estimation\.num_mini_batches must be <= env\.num_envs = 4, got 5"
+    with pytest.raises(ValueError, match=words):
+        TaskCfg(env, AgentCfg(estimation=EstimationCfg(num_mini_batches=5)))

@@ -63,6 +63,55 @@ def test_a_resumed_run_equals_an_uninterrupted_one_bit_for_bit(whole_run, tmp_pa
     assert _curves(tmp_path) == _curves(directory)[2:]
 
 
+def test_every_curriculum_is_on_its_way_where_these_runs_are_resumed(whole_run):
+    directory, _ = whole_run
+    for name in ("quiet", "lift", "commands"):
+        values = [line[f"Curriculum/{name}"] for line in _curves(directory)]
+        # Steps of 20 ms on a ramp of 0.8 s: the means of 1-8, 9-16, 17-24 and 25-32 over 40.
+        assert values == pytest.approx([0.1125, 0.3125, 0.5125, 0.7125], abs=1e-6)
+
+
+def test_a_forgotten_curriculum_would_change_what_a_resumed_run_learns(whole_run, tmp_path):
+    directory, expected = whole_run
+    runner = make_runner(tmp_path, iterations=4)
+    runner.load(str(directory / "model_1.pt"))
+    runner.env.env.step_count = 0
+    runner.train()
+    changed = differences(_everything(runner), expected)
+    assert any(place.startswith("/learner/actor_state_dict") for place in changed)
+    assert any(place.startswith("/world/env/command") for place in changed)
+
+
+def test_on_two_threads_with_quick_products_a_resumed_run_is_bit_equal_too(tmp_path, monkeypatch):
+    precision, threads = torch.get_float32_matmul_precision(), torch.get_num_threads()
+    used = []
+
+    def two_threads() -> None:
+        torch.set_num_threads(2)
+        used.append(torch.get_num_threads())
+
+    monkeypatch.setattr("mute.algorithm.use_learning_threads", two_threads)
+    monkeypatch.setattr("mute.estimated_env.use_learning_threads", two_threads)
+    cfg = make_cfg(2, num_envs=32)
+    # Wide enough that torch splits the work.
+    cfg.agent.actor_hidden = cfg.agent.critic_hidden = (256,)
+    cfg.agent.estimation.network.lstm_hidden = 64
+    cfg.agent.ppo.num_learning_epochs = 1
+    try:
+        torch.set_float32_matmul_precision("medium")
+        whole = MuteRunner("go1_mute", cfg, tmp_path / "whole")
+        whole.train()
+        resumed = MuteRunner("go1_mute", cfg, tmp_path / "resumed")
+        resumed.load(str(tmp_path / "whole" / "model_0.pt"))
+        resumed.train()
+    finally:
+        torch.set_float32_matmul_precision(precision)
+        torch.set_num_threads(threads)
+    assert set(used) == {2}
+    assert differences(_everything(resumed), _everything(whole)) == []
+    assert _curves(tmp_path / "resumed") == _curves(tmp_path / "whole")[1:]
+
+
 def test_a_second_run_with_the_same_seed_is_bit_equal_and_another_seed_is_not(whole_run, tmp_path):
     directory, _ = whole_run
     for name, seed in (("same", 3), ("other", 4)):
@@ -169,6 +218,20 @@ def test_curves_logged_after_the_checkpoint_and_a_line_cut_short_are_dropped(tmp
     writer.stop()
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     assert lines == [{"iteration": 0}, {"iteration": 1}, {"iteration": 2, "Loss/value": 0.5}]
+
+
+def test_curves_stay_whole_where_they_cannot_be_written_anew(tmp_path, monkeypatch):
+    path = tmp_path / "curves.jsonl"
+    path.write_text('{"iteration": 0}\n{"iteration": 1}\n')
+
+    def fail(source, target) -> None:
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr("mute.logger.os.replace", fail)
+    with pytest.raises(OSError, match="no space"):
+        CurveWriter(str(tmp_path), first_iteration=1)
+    assert path.read_text() == '{"iteration": 0}\n{"iteration": 1}\n'
+    assert list(tmp_path.glob("*.tmp")) == []
 
 
 def test_the_random_start_ages_come_with_a_new_run_alone(whole_run, monkeypatch):

@@ -15,6 +15,7 @@ import yaml
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from envs.rewards import TERMS
+from envs.scene import SceneError
 from mute.checkpoint import load_checkpoint, save_checkpoint
 from mute.command_lines import train
 from mute.command_lines.train import main
@@ -207,6 +208,8 @@ def test_a_killed_run_leaves_whole_checkpoints_and_curves_that_go_on_without_rep
     assert len(checkpoints) >= len(out.splitlines()) - 1 >= 3
     for path in checkpoints:
         assert load_checkpoint(path)["iter"] == int(path.stem.removeprefix("model_"))
+    for path in checkpoints[2:]:
+        path.unlink()
     assert _train("--resume", str(run / "model_1.pt"), "--iterations", "4") == 0
     assert [line["iteration"] for line in _curves(run)] == [0, 1, 2, 3]
     steps = [event.step for event in _tensorboard(run).Scalars("Loss/value")]
@@ -235,6 +238,44 @@ def test_a_resume_that_cannot_be_leaves_the_written_parameters_alone(finished, c
     assert (run / "config.yaml").read_text() == before
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--seed", "6"], ["--seed 6", "its own seed 5"]),
+        (["--env.seed", "6"], ["--seed 6", "its own seed 5"]),
+        (["--run-name", "other"], ["--run-name other"]),
+    ],
+    ids=lambda value: " ".join(value),
+)
+def test_an_option_that_a_resumed_run_cannot_heed_is_refused(arguments, words, finished, capsys):
+    path = str(finished[0] / "model_2.pt")
+    with pytest.raises(SystemExit) as stop:
+        run_cli(lambda: main(["--plain", "--resume", path, "--iterations", "9", *arguments]))
+    assert stop.value.code == 2
+    error = capsys.readouterr().err
+    assert _is_one_line(error)
+    assert all(word in error for word in words), error
+
+
+def test_the_seed_that_a_resumed_run_has_may_be_given(finished):
+    path = str(finished[0] / "model_2.pt")
+    args, checkpoint = train._arguments(["--resume", path, "--seed", "5"])
+    assert checkpoint == Path(path)
+    assert train._configuration(args).env.seed == 5
+
+
+def test_a_checkpoint_that_later_ones_follow_is_not_resumed(finished, capsys):
+    run, _ = finished
+    before = {path: path.read_bytes() for path in run.glob("*.*")}
+    with pytest.raises(SystemExit) as stop:
+        run_cli(lambda: main(["--plain", "--resume", str(run / "model_0.pt")]))
+    assert stop.value.code == 2
+    error = capsys.readouterr().err
+    assert _is_one_line(error)
+    assert f"resume {run / 'model_2.pt'}, or delete or move" in error
+    assert {path: path.read_bytes() for path in run.glob("*.*")} == before
+
+
 # -- bad input -----------------------------------------------------------------------------------
 
 
@@ -254,6 +295,8 @@ def test_a_resume_that_cannot_be_leaves_the_written_parameters_alone(finished, c
         (["--resume", "."], ["directory"]),
         (["--resume", "latest"], ["no checkpoint"]),
         (["--run-name", "../up"], ["--run-name", "../up"]),
+        (["--run-name", ".."], ["--run-name", "'..'"]),
+        (["--run-name", "."], ["--run-name", "'.'"]),
         (["--bogus", "3"], ["--bogus"]),
         (["stray"], ["stray"]),
         (["--env.rewards.k", "1.5"], ["rewards.k", "1.5"]),
@@ -262,6 +305,13 @@ def test_a_resume_that_cannot_be_leaves_the_written_parameters_alone(finished, c
         (["--agent.ppo.num-mini-batches", "0"], ["num_mini_batches", "0"]),
         (["--agent.activation", "foo"], ["activation", "foo"]),
         (["--agent.init-std", "-1.0"], ["init_std", "-1.0"]),
+        (["--env.height-map.spacing", "0.0"], ["height_map.spacing", "> 0", "0.0"]),
+        (["--env.rewards.landing-speed", "nan"], ["rewards.landing_speed", "finite", "nan"]),
+        (["--env.observations.noise-level", "inf"], ["observations.noise_level", "inf"]),
+        (["--env.randomization.added-mass", "-6.0", "0.0"], ["added_mass", "-5.204", "-6.0"]),
+        (["--env.randomization.push-velocity", "nan"], ["push_velocity", "nan"]),
+        (["--agent.ppo.num-mini-batches", "25"], ["agent.ppo.num_mini_batches", "24", "25"]),
+        (["--num-envs", "3"], ["agent.estimation.num_mini_batches", "env.num_envs = 3", "4"]),
     ],
     ids=lambda value: " ".join(value),
 )
@@ -302,6 +352,19 @@ def test_a_checkpoint_that_cannot_be_resumed_is_refused_in_one_line(
     assert words in error
     assert str(path) in error
     assert [item.name for item in tmp_path.iterdir()] == ["model_0.pt"]
+
+
+@pytest.mark.parametrize("kind", [ValueError, SceneError])
+def test_what_the_world_refuses_is_told_in_one_line_and_leaves_nothing(
+    kind, tmp_path, capsys, monkeypatch
+):
+    def refuse(*args) -> None:
+        raise kind("look: meshes are missing")
+
+    monkeypatch.setattr(train, "MuteRunner", refuse)
+    assert _train("--log-dir", str(tmp_path / "runs")) == 2
+    assert capsys.readouterr().err == "error: look: meshes are missing\n"
+    assert not (tmp_path / "runs").exists()
 
 
 def test_a_log_directory_that_cannot_be_made_is_told_in_one_line(tmp_path, capsys):
