@@ -6,10 +6,8 @@ done with it after loading, is left to the runner and the players.
 
 from __future__ import annotations
 
-import contextlib
 import glob
 import io
-import os
 import pickle
 import re
 import zipfile
@@ -20,6 +18,7 @@ from typing import Any
 import torch
 
 from mute.errors import MuteError
+from mute.files import replace_file
 
 _FORMAT = "mute-checkpoint"
 _VERSION = 1
@@ -61,7 +60,7 @@ def save_checkpoint(path: Path, payload: dict[str, Any]) -> None:
     torch.save({"format": _FORMAT, "version": _VERSION, **payload}, buffer)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _replace_file(path, buffer.getbuffer())
+        replace_file(path, buffer.getbuffer())
     except OSError as error:
         raise CheckpointError(f"cannot write checkpoint {path}: {error.strerror}") from error
 
@@ -148,30 +147,6 @@ def _check_plain(value: object, place: str) -> None:
 
 def _type_name(value: object) -> str:
     return f"{type(value).__module__}.{type(value).__qualname__}".removeprefix("builtins.")
-
-
-def _replace_file(path: Path, data: memoryview) -> None:
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-    try:
-        with temporary.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    # Makes the new name survive a power cut. Some file systems refuse, but the file is in place.
-    with contextlib.suppress(OSError):
-        _sync_directory(path.parent)
-
-
-def _sync_directory(directory: Path) -> None:
-    descriptor = os.open(directory, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _check_archive(path: Path) -> None:

@@ -15,7 +15,6 @@ import contextlib
 import dataclasses
 import json
 import logging
-import os
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -34,6 +33,7 @@ from mute.controllers import load_policy
 from mute.controllers.learned import Policy
 from mute.errors import MuteError, run_cli
 from mute.estimated_env import estimate_group
+from mute.files import replace_file
 
 __all__ = ["ExportArgs", "export_policy", "main"]
 
@@ -96,7 +96,7 @@ def export_policy(policy: Policy, out: Path) -> None:
     onnx.checker.check_model(model)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        _replace_file(out, model.SerializeToString())
+        replace_file(out, model.SerializeToString())
     except OSError as error:
         raise MuteError(f"cannot write {out}: {error.strerror}") from error
 
@@ -199,18 +199,6 @@ def _servo_of(model: mujoco.MjModel, joint: int) -> int:
 
 def _comma_separated(values: Sequence[str | float]) -> str:
     return ",".join(value if isinstance(value, str) else repr(value) for value in values)
-
-
-def _replace_file(path: Path, data: bytes) -> None:
-    """Write a file so that `path` holds either the old content or the new, whole."""
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_bytes(data)
-        os.replace(temporary, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        raise
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +21,8 @@ from rich.table import Table
 from rsl_rl.utils import LogWriter
 from rsl_rl.utils.logger import Logger
 from torch.utils.tensorboard import SummaryWriter
+
+from mute.files import replace_file
 
 __all__ = ["CurveWriter", "LiveDisplay", "PlainDisplay", "TrainingLogger"]
 
@@ -196,13 +197,7 @@ def _drop_from(path: Path, first_iteration: int) -> None:
         with contextlib.suppress(ValueError):
             if json.loads(line)["iteration"] < first_iteration:
                 kept.append(line)
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_text("".join(kept))
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    replace_file(path, "".join(kept).encode())
 
 
 def _figures(scalars: dict[str, float]) -> RenderableType:

@@ -100,10 +100,7 @@ progress   measure a run's checkpoints until one walks
 
 
 def _progress(args: ProgressArgs) -> None:
-    if args.trials < 1:
-        raise MuteError(f"--trials must be >= 1, got {args.trials}")
-    if not args.seconds > 1.0:
-        raise MuteError(f"--seconds must be > 1, got {args.seconds:g}")
+    _check_trials(args.trials, args.seconds)
     torch.set_num_threads(1)  # the physics engine has the cores
     rows: list[dict[str, Any]] = []
     for path in track(checkpoints_of(args.run), "checkpoints"):
@@ -191,11 +188,15 @@ def _draw_commands(env: QuadrupedEnv, seed: int) -> CommandSampler:
     return draw
 
 
+def _check_trials(trials: int, seconds: float) -> None:
+    if trials < 1:
+        raise MuteError(f"--trials must be >= 1, got {trials}")
+    if not seconds > 1.0:
+        raise MuteError(f"--seconds must be > 1, got {seconds:g}")
+
+
 def _check(args: GaitArgs) -> None:
-    if args.trials < 1:
-        raise MuteError(f"--trials must be >= 1, got {args.trials}")
-    if not args.seconds > 1.0:
-        raise MuteError(f"--seconds must be > 1, got {args.seconds:g}")
+    _check_trials(args.trials, args.seconds)
     if not args.beta or any(not 0.0 <= beta <= 1.0 for beta in args.beta):
         raise MuteError(f"--beta must be numbers in [0, 1], got {' '.join(map(str, args.beta))}")
     if not 0.0 < args.speed <= 1.0:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import re
 import shlex
 import sys
@@ -22,6 +21,7 @@ from mute.checkpoint import CheckpointError, latest_checkpoint, load_checkpoint
 from mute.command_lines.arguments import command_line, parse, resolve_device, selected_task
 from mute.config import AgentCfg, TaskCfg, from_plain, to_plain
 from mute.errors import MuteError
+from mute.files import replace_file
 from mute.logger import LiveDisplay, PlainDisplay
 from mute.provenance import current_commit, machine_kind
 from mute.runner import MuteRunner
@@ -204,6 +204,4 @@ def _write_parameters(run_dir: Path, args: TrainArgs, cfg: TaskCfg, argv: Sequen
         resumed = [*before.get("resumed", []), origin]
         origin = {name: before.get(name) for name in origin} | {"resumed": resumed}
     content = {"task": args.task, **origin, **to_plain(cfg)}
-    temporary = path.with_suffix(".tmp")
-    temporary.write_text(yaml.safe_dump(content, sort_keys=False))
-    os.replace(temporary, path)
+    replace_file(path, yaml.safe_dump(content, sort_keys=False).encode())

@@ -251,7 +251,7 @@ def test_a_failed_write_leaves_the_previous_file_whole(
     def fail(source: Path, target: Path) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("mute.export.os.replace", fail)
+    monkeypatch.setattr("mute.files.os.replace", fail)
     with pytest.raises(MuteError, match=r"cannot write .*policy\.onnx: No space left on device"):
         export_policy(policy, out)
     assert [path.name for path in tmp_path.iterdir()] == ["policy.onnx"]

@@ -227,7 +227,7 @@ def test_curves_stay_whole_where_they_cannot_be_written_anew(tmp_path, monkeypat
     def fail(source, target) -> None:
         raise OSError("no space left on device")
 
-    monkeypatch.setattr("mute.logger.os.replace", fail)
+    monkeypatch.setattr("mute.files.os.replace", fail)
     with pytest.raises(OSError, match="no space"):
         CurveWriter(str(tmp_path), first_iteration=1)
     assert path.read_text() == '{"iteration": 0}\n{"iteration": 1}\n'
