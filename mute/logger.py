@@ -51,6 +51,7 @@ class CurveWriter(LogWriter):
             first_iteration: Iteration that logging goes on with; what the files hold from it on was
                 logged by a run that ended without saving it, and is dropped.
         """
+        _outlast_second_of_newest(Path(log_dir))
         self._tensorboard = SummaryWriter(
             log_dir=log_dir, purge_step=first_iteration or None, flush_secs=10
         )
@@ -183,6 +184,18 @@ class PlainDisplay:
         print(
             f"{iteration + 1}/{total}", *figures, f"left {left / 60:.1f} min", sep=" | ", flush=True
         )
+
+
+def _outlast_second_of_newest(log_dir: Path) -> None:
+    """Wait, a second at most, until a new event file's name comes after all that are there.
+
+    TensorBoard reads a run's files in the order of their names, which begin with the second of
+    their making and go on with the process. A run that is resumed within that second could be read
+    before what it continues, and what it drops would show again.
+    """
+    made = {path.name.split(".")[3] for path in log_dir.glob("events.out.tfevents.*")}
+    while f"{int(time.time()):010d}" in made:
+        time.sleep(0.01)
 
 
 def _drop_from(path: Path, first_iteration: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import time
 
 import pytest
 import torch
@@ -218,6 +219,22 @@ def test_curves_logged_after_the_checkpoint_and_a_line_cut_short_are_dropped(tmp
     writer.stop()
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     assert lines == [{"iteration": 0}, {"iteration": 1}, {"iteration": 2, "Loss/value": 0.5}]
+
+
+def test_a_run_resumed_within_the_second_it_was_stopped_in_still_reads_in_order(tmp_path):
+    first = CurveWriter(str(tmp_path))
+    for iteration in range(4):
+        first.add_scalar("Loss/value", 1.0, iteration)
+    first.stop()
+    (written,) = tmp_path.glob("events.*")
+    # A process whose name sorts after ours, and the same second.
+    written.rename(tmp_path / f"events.out.tfevents.{int(time.time()):010d}.~host.999999.0")
+    resumed = CurveWriter(str(tmp_path), first_iteration=2)
+    for iteration in (2, 3):
+        resumed.add_scalar("Loss/value", 2.0, iteration)
+    resumed.stop()
+    events = EventAccumulator(str(tmp_path)).Reload().Scalars("Loss/value")
+    assert [(event.step, event.value) for event in events] == [(0, 1), (1, 1), (2, 2), (3, 2)]
 
 
 def test_curves_stay_whole_where_they_cannot_be_written_anew(tmp_path, monkeypatch):
