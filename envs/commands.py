@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -42,9 +43,10 @@ class CommandsCfg:
         """
         for name in ("lin_vel_x", "lin_vel_y", "ang_vel_z", "beta"):
             low, high = getattr(self, name)
-            if not low <= high:
+            if not -math.inf < low <= high < math.inf:
                 raise ValueError(
-                    f"commands.{name} must be (low, high) with low <= high, got {(low, high)}"
+                    f"commands.{name} must be finite (low, high) with low <= high, "
+                    f"got {(low, high)}"
                 )
         if not 0.0 <= self.beta[0] <= self.beta[1] <= 1.0:
             raise ValueError(f"commands.beta must lie in [0, 1], got {self.beta}")
@@ -54,12 +56,14 @@ class CommandsCfg:
             )
         if not 0.0 <= self.initial_share <= 1.0:
             raise ValueError(f"commands.initial_share must be in [0, 1], got {self.initial_share}")
-        if not 0.0 <= self.ramp[0] <= self.ramp[1]:
+        if not 0.0 <= self.ramp[0] <= self.ramp[1] < math.inf:
             raise ValueError(
                 f"commands.ramp must be (start, end) with 0 <= start <= end, got {self.ramp}"
             )
-        if self.resampling_time <= 0.0:
-            raise ValueError(f"commands.resampling_time must be > 0, got {self.resampling_time}")
+        if not 0.0 < self.resampling_time < math.inf:
+            raise ValueError(
+                f"commands.resampling_time must be > 0 and finite, got {self.resampling_time}"
+            )
 
 
 class CommandSampler:

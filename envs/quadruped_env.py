@@ -91,8 +91,11 @@ class QuadrupedEnvCfg:
             if getattr(self, name) < 1:
                 raise ValueError(f"env.{name} must be >= 1, got {getattr(self, name)}")
         for name in ("episode_length", "action_scale", "action_clip", "max_tilt"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"env.{name} must be > 0, got {getattr(self, name)}")
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"env.{name} must be > 0 and finite, got {getattr(self, name)}")
+        for name in ("initial_joint_noise", "initial_velocity"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"env.{name} must be >= 0 and finite, got {getattr(self, name)}")
 
     @property
     def step_dt(self) -> float:
@@ -182,8 +185,8 @@ class QuadrupedEnv(VecEnv):
         self.step_count += 1
         self.episode_length_buf += 1
         self._read_state()
-        reward, shares = self.reward_sum(self._motion(), self.quiet, self.lift)
         terminated = self._terminated()
+        reward, shares = self.reward_sum(self._motion(), self.quiet, self.lift)
         time_outs = (self.episode_length_buf >= self.max_episode_length) & ~terminated
         dones = terminated | time_outs
         # What an unstable simulation did is not the policy's merit or fault.
@@ -345,6 +348,7 @@ class QuadrupedEnv(VecEnv):
             touchdown=feet.touchdown,
             landing_speed=feet.landing_speed,
             swing_apex=feet.swing_apex,
+            fallen=self.fallen,
         )
 
     def _terminated(self) -> torch.Tensor:

@@ -63,6 +63,8 @@ class Motion:
     """Landing speed of the feet that landed, else 0. Shape: (num_envs, 4)."""
     swing_apex: torch.Tensor
     """Highest clearance of the current or last swing, m. Shape: (num_envs, 4)."""
+    fallen: torch.Tensor
+    """Robots whose episode this step ends by a fall, bool. Shape: (num_envs,)."""
 
 
 @dataclass
@@ -109,6 +111,8 @@ class RewardsCfg:
     """sum over the feet in contact of |v_xy|^2."""
     stand_still: float = 0.0
     """sum over joints of the distance to the stance, while asked to stand."""
+    fall: float = 0.0
+    """1 in the step that ends an episode by a fall; not in the paper."""
 
     k: float = 0.2
     """How much of the task reward beta = 1 gives up (paper, section II-C)."""
@@ -124,7 +128,8 @@ class RewardsCfg:
     """Seconds of simulated time per environment between which the phase group's weight grows from
     0 to 1: a full-strength quiet term from the first step teaches the robot to stand still."""
     lift_ramp: tuple[float, float] = (0.0, 0.0)
-    """The same for the lift group: shuffling, which it forbids, is how walking begins."""
+    """The same for the lift group: shuffling and falling, which it forbids, are how walking
+    begins."""
 
     def __post_init__(self) -> None:
         """Check what the weights cannot express.
@@ -260,6 +265,15 @@ def stand_still(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
     return motion.joint_pos.abs().sum(dim=1) * standing
 
 
+def fall(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
+    """Penalise a fall.
+
+    Where the other terms leave little to gain, as a high beta does at a fast command, ending the
+    episode would cost nothing else.
+    """
+    return motion.fallen.float()
+
+
 Term = Callable[[Motion, RewardsCfg], torch.Tensor]
 
 GROUPS: dict[str, tuple[Term, ...]] = {
@@ -277,7 +291,7 @@ GROUPS: dict[str, tuple[Term, ...]] = {
         smoothness,
         power_distribution,
     ),
-    "lift": (foot_clearance, touchdown_apex, foot_slip, stand_still),
+    "lift": (foot_clearance, touchdown_apex, foot_slip, stand_still, fall),
 }
 """Terms by the factor they get: (1 - k beta), beta times a ramp, 1, and a ramp."""
 

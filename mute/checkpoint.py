@@ -159,8 +159,7 @@ def _check_archive(path: Path) -> None:
             start = file.read(len(_ZIP_MAGIC))
     except FileNotFoundError:
         raise CheckpointError(
-            f"no checkpoint at {path}; give the path of a model_<iteration>.pt, "
-            "or 'latest' for the newest run's"
+            f"no checkpoint at {path}; give the path of a model_<iteration>.pt"
         ) from None
     except IsADirectoryError:
         raise CheckpointError(f"{path} is a directory, not a checkpoint file") from None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 import torch
 
@@ -92,6 +94,7 @@ def test_commands_are_written_in_place():
     ("field", "value"),
     [
         ("lin_vel_x", (1.0, -1.0)),
+        ("lin_vel_x", (-math.inf, math.inf)),
         ("lin_vel_y", (0.1, 0.0)),
         ("ang_vel_z", (0.1, 0.0)),
         ("beta", (0.6, 0.5)),
@@ -100,6 +103,7 @@ def test_commands_are_written_in_place():
         ("standing_fraction", 1.5),
         ("standing_fraction", -0.5),
         ("resampling_time", 0.0),
+        ("resampling_time", math.inf),
     ],
 )
 def test_a_bad_field_is_refused_by_name(field, value):

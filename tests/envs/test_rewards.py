@@ -107,6 +107,7 @@ CASES = {
         {"command": [[0, 0, 0, 0.7], [0, 0.1]], "joint_pos": [[0.1, -0.2], [0.1, -0.2]]},
         [0.3, 0.0],
     ),
+    "fall": ({"fallen": [False, True]}, [0.0, 1.0]),
 }
 
 
@@ -124,6 +125,7 @@ def _make_motion(**given):
         values[name] = values[name] > 0.5
     for name in ("base_height", "collisions"):
         values[name] = torch.tensor(given.pop(name, [0.0, 0.0]))
+    values["fallen"] = torch.tensor(given.pop("fallen", [False, False]))
     assert not given
     return Motion(**values)
 

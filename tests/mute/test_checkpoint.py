@@ -220,8 +220,8 @@ def test_a_damaged_pickle_inside_the_archive_is_an_error_of_one_line(tmp_path):
     assert "\n" not in str(caught.value)
 
 
-def test_a_missing_checkpoint_names_the_path_and_hints_at_latest(tmp_path):
-    with pytest.raises(CheckpointError, match=r"model_9\.pt; .*'latest'"):
+def test_a_missing_checkpoint_names_the_path_and_what_to_give(tmp_path):
+    with pytest.raises(CheckpointError, match=r"model_9\.pt; .*model_<iteration>\.pt"):
         load_checkpoint(tmp_path / "model_9.pt")
 
 
