@@ -8,7 +8,7 @@ from envs.commands import CommandsCfg
 from envs.quadruped_env import QuadrupedEnvCfg
 from envs.randomization import RandomizationCfg
 from envs.rewards import RewardsCfg
-from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg
+from mute.config import AgentCfg, EstimationCfg, TaskCfg
 from mute.errors import MuteError
 
 __all__ = ["DEFAULT_TASK", "make_task", "task_names"]
@@ -40,18 +40,15 @@ def _go1_mute() -> TaskCfg:
         touchdown_apex=-2.0,
         foot_slip=-0.04,
         stand_still=-0.1,
-        fall=-100.0,
-        lift_ramp=(40.0, 90.0),
-        quiet_ramp=(80.0, 148.0),
+        fall=-250.0,
+        lift_ramp=(60.0, 120.0),
+        quiet_ramp=(100.0, 168.4),
     )
     randomization = RandomizationCfg(push_interval=0.0)
-    commands = CommandsCfg(initial_share=0.4, ramp=(12.0, 44.0))
-    # Until it walks, a run is limited by how far an update may move the policy, not by how many
-    # samples it sees: short rollouts and a large step get there in fewer of them.
-    ppo = PPOCfg(desired_kl=0.02)
+    commands = CommandsCfg(initial_share=0.4, ramp=(16.0, 50.0))
     return TaskCfg(
         env=QuadrupedEnvCfg(rewards=rewards, randomization=randomization, commands=commands),
-        agent=AgentCfg(iterations=641, num_steps_per_env=16, ppo=ppo),
+        agent=AgentCfg(iterations=401),
     )
 
 
