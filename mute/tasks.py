@@ -36,9 +36,12 @@ def _go1_mute() -> TaskCfg:
         foot_raise_velocity=0.0114,
         near_ground_drop=-1.71,
         landing_speed=-3.42,
+        # A high beta that turns on the spot would rather pivot on its feet than lift them, and
+        # lean until it topples.
+        orientation=-4.0,
+        foot_slip=-0.3,
         foot_clearance=-20.0,
         touchdown_apex=-2.0,
-        foot_slip=-0.04,
         stand_still=-0.1,
         fall=-250.0,
         lift_ramp=(60.0, 120.0),
