@@ -111,6 +111,8 @@ class RewardsCfg:
     """sum over the feet in contact of |v_xy|^2."""
     stand_still: float = 0.0
     """sum over joints of the distance to the stance, while asked to stand."""
+    tilt: float = 0.0
+    """|g_xy|^2 once more, in the lift group: a first step is not taken level."""
     fall: float = 0.0
     """1 in the step that ends an episode by a fall; not in the paper."""
 
@@ -265,6 +267,11 @@ def stand_still(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
     return motion.joint_pos.abs().sum(dim=1) * standing
 
 
+def tilt(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
+    """Penalise a tilted trunk, as `orientation` does."""
+    return orientation(motion, cfg)
+
+
 def fall(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
     """Penalise a fall.
 
@@ -291,7 +298,7 @@ GROUPS: dict[str, tuple[Term, ...]] = {
         smoothness,
         power_distribution,
     ),
-    "lift": (foot_clearance, touchdown_apex, foot_slip, stand_still, fall),
+    "lift": (foot_clearance, touchdown_apex, foot_slip, stand_still, tilt, fall),
 }
 """Terms by the factor they get: (1 - k beta), beta times a ramp, 1, and a ramp."""
 

@@ -38,7 +38,7 @@ def _go1_mute() -> TaskCfg:
         landing_speed=-3.42,
         # A high beta that turns on the spot would rather pivot on its feet than lift them, and
         # lean until it topples.
-        orientation=-4.0,
+        tilt=-4.0,
         foot_slip=-0.3,
         foot_clearance=-20.0,
         touchdown_apex=-2.0,
