@@ -43,7 +43,7 @@ class FootfallCfg:
 class Footfalls:
     """Follows the feet of every robot: contact, phase, landings and swings.
 
-    Order within a control step: `begin`, `record` after each physics step, `update` once.
+    Order within a control step: `record` the physics steps, then `update`.
     """
 
     def __init__(self, cfg: FootfallCfg, num_envs: int, timestep: float, decimation: int) -> None:
@@ -64,7 +64,6 @@ class Footfalls:
         self._window = max(1, round(cfg.landing_window / timestep))
         # A landing is confirmed min_steps - 1 control steps late and looks back over its window.
         self._depth = (self.min_steps + math.ceil(self._window / decimation)) * decimation
-        self._cursor = 0
         shape = (num_envs, _NUM_FEET)
         self._drop = torch.zeros(self._depth, *shape)
         self._raise = torch.zeros(decimation, *shape)
@@ -98,25 +97,20 @@ class Footfalls:
         """Causal phase, from the durations of the foot's last segments. Shape: (num_envs, 4)."""
         return self._contacts.phase
 
-    def begin(self) -> None:
-        """Make room for the physics steps of a control step."""
+    def record(self, foot_vel_z: torch.Tensor, found: torch.Tensor) -> None:
+        """Take in the physics steps of a control step, the oldest first.
+
+        Args:
+            foot_vel_z: Vertical velocity of each foot in the world, m/s.
+                Shape: (decimation, num_envs, 4).
+            found: Number of contacts of each foot. Shape: (decimation, num_envs, 4).
+        """
         keep = self._depth - self._decimation
         self._drop[:keep] = self._drop[self._decimation :].clone()
         self._touch[:keep] = self._touch[self._decimation :].clone()
-        self._cursor = 0
-
-    def record(self, foot_vel_z: torch.Tensor, found: torch.Tensor) -> None:
-        """Take in one physics step.
-
-        Args:
-            foot_vel_z: Vertical velocity of each foot in the world, m/s. Shape: (num_envs, 4).
-            found: Number of contacts of each foot. Shape: (num_envs, 4).
-        """
-        row = self._depth - self._decimation + self._cursor
-        torch.clamp(-foot_vel_z, min=0.0, out=self._drop[row])
-        torch.clamp(foot_vel_z, min=0.0, out=self._raise[self._cursor])
-        torch.gt(found, 0.0, out=self._touch[row])
-        self._cursor += 1
+        torch.clamp(-foot_vel_z, min=0.0, out=self._drop[keep:])
+        torch.clamp(foot_vel_z, min=0.0, out=self._raise)
+        torch.gt(found, 0.0, out=self._touch[keep:])
 
     def update(self, clearance: torch.Tensor) -> None:
         """Close the control step: contacts, phase, landings and apexes.

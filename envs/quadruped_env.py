@@ -25,7 +25,15 @@ from envs.observations import (
 )
 from envs.randomization import PHYSICS_DIM, RandomizationCfg, randomize_physics
 from envs.rewards import Motion, RewardsCfg, RewardSum
-from envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS, SceneCfg, build_scene, sensor_slice
+from envs.scene import (
+    FOOT_RADIUS,
+    LEGS,
+    STAND_JOINT_POS,
+    SceneCfg,
+    build_scene,
+    sensor_history,
+    sensor_slice,
+)
 from envs.simulation import make_simulation
 from envs.terrain import FlatTerrain, HeightMapCfg, height_map
 
@@ -130,7 +138,7 @@ class QuadrupedEnv(VecEnv):
         self.step_dt = cfg.step_dt
         self.max_episode_length = math.ceil(cfg.episode_length / cfg.step_dt)
         self.generator = torch.Generator().manual_seed(cfg.seed)
-        self.model = build_scene(cfg.scene)
+        self.model = build_scene(cfg.scene, foot_samples=cfg.decimation)
         self.simulation = make_simulation(self.model, cfg.num_envs, num_threads=cfg.num_threads)
         self.device = self.simulation.device
         self.physics = randomize_physics(self.simulation, cfg.randomization, self.generator)
@@ -281,10 +289,8 @@ class QuadrupedEnv(VecEnv):
         """Run the physics of one control step and record the feet at every physics step."""
         simulation = self.simulation
         torch.add(self.stand, self.action, alpha=self.cfg.action_scale, out=simulation.ctrl)
-        self.footfalls.begin()
-        for _ in range(self.cfg.decimation):
-            simulation.step()
-            self.footfalls.record(self._foot_vel_z, self._foot_contact)
+        simulation.step(self.cfg.decimation)
+        self.footfalls.record(self._foot_vel_z_history, self._foot_contact_history)
         self.unstable = simulation.unstable()
         if bool(self.unstable.any()):
             # Reset before anything is read, so that no NaN reaches a reward or an average.
@@ -471,10 +477,18 @@ class QuadrupedEnv(VecEnv):
 
         self._foot_pos = view(f"{LEGS[0]}_foot_pos", feet).unflatten(1, (feet, 3))
         self._foot_vel = view(f"{LEGS[0]}_foot_vel", feet).unflatten(1, (feet, 3))
-        self._foot_vel_z = self._foot_vel[:, :, 2]
         self._foot_contact = view(f"{LEGS[0]}_foot_contact", feet)
         self._trunk_contact = view("trunk_contact", 2)
         self._link_contact = view("trunk_contact", _NUM_LINKS)
+
+        def past(first: str) -> torch.Tensor:
+            columns, samples, size = sensor_history(self.model, first, feet)
+            rows = self.simulation.history[:, columns].unflatten(1, (feet, -1))
+            readings = rows[:, :, 2 + samples :].unflatten(2, (samples, size))
+            return readings.permute(2, 0, 1, 3)
+
+        self._foot_vel_z_history = past(f"{LEGS[0]}_foot_vel")[..., 2]
+        self._foot_contact_history = past(f"{LEGS[0]}_foot_contact")[..., 0]
 
     def _allocate(self) -> None:
         num_envs = self.num_envs

@@ -122,17 +122,26 @@ class SceneCfg:
         _require_choice("look", self.look, get_args(Look))
 
 
-def build_scene(cfg: SceneCfg) -> mujoco.MjModel:
+def build_scene(cfg: SceneCfg, foot_samples: int = 0) -> mujoco.MjModel:
     """Compile the scene that `cfg` describes.
+
+    Args:
+        cfg: The scene.
+        foot_samples: See `make_spec`.
 
     Raises:
         SceneError: The look needs a package or meshes that are not there.
     """
-    return make_spec(cfg).compile()
+    return make_spec(cfg, foot_samples).compile()
 
 
-def make_spec(cfg: SceneCfg) -> mujoco.MjSpec:
+def make_spec(cfg: SceneCfg, foot_samples: int = 0) -> mujoco.MjSpec:
     """Assemble robot, floor and sensors, open to further editing before it is compiled.
+
+    Args:
+        cfg: The scene.
+        foot_samples: Physics steps of which the feet's velocity and contact sensors keep the
+            readings, so that all of them can be had after one call that makes several steps.
 
     Raises:
         SceneError: The look needs a package or meshes that are not there.
@@ -144,6 +153,9 @@ def make_spec(cfg: SceneCfg) -> mujoco.MjSpec:
     _add_floor(spec, cfg)
     _add_foot_sensors(spec)
     _add_contact_sensors(spec)
+    for leg in LEGS:
+        for quantity in ("vel", "contact"):
+            spec.sensor(f"{leg}_foot_{quantity}").nsample = foot_samples
     if cfg.look == "menagerie":
         _dress_in_menagerie(spec)
     return spec
@@ -172,6 +184,27 @@ def sensor_slice(model: mujoco.MjModel, first_name: str, count: int) -> slice:
         raise ValueError(f"the {count} sensors from {first_name!r} on are not contiguous: {names}")
     start = int(model.sensor_adr[first])
     return slice(start, start + count * int(model.sensor_dim[first]))
+
+
+def sensor_history(model: mujoco.MjModel, first_name: str, count: int) -> tuple[slice, int, int]:
+    """Return where `count` sensors, from `first_name` on, keep their past readings.
+
+    Each keeps a row of two numbers of MuJoCo's own, a time for every sample, and the samples.
+
+    Returns:
+        The columns of `history` that all rows fill, the samples and the dimension of a sensor.
+
+    Raises:
+        ValueError: There are no such sensors, or they keep nothing.
+    """
+    dim = sensor_slice(model, first_name, count)  # checks that the sensors are there and of a kind
+    size = (dim.stop - dim.start) // count
+    first = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, first_name)
+    samples = int(model.sensor_history[first, 0])
+    if samples < 1:
+        raise ValueError(f"first_name is {first_name!r}: the sensor keeps no past readings")
+    start = int(model.sensor_historyadr[first])
+    return slice(start, start + count * (2 + samples * (1 + size))), samples, size
 
 
 def _require_number(

@@ -55,6 +55,9 @@ class Simulation(Protocol):
     """Sensor readings. Shape: (num_envs, nsensordata)."""
     actuator_force: torch.Tensor
     """Actuator forces, N or N m. Shape: (num_envs, nu)."""
+    history: torch.Tensor
+    """Past readings of the sensors that keep them, see `scene.sensor_history`: rings, which begin
+    with the oldest reading after as many steps as they hold. Shape: (num_envs, nhistory)."""
 
     def step(self, num_steps: int = 1) -> None:
         """Advance every simulation by a number of physics steps."""
@@ -112,6 +115,7 @@ class BatchSimulation:
         self.ctrl = self._bind("ctrl")
         self.sensordata = self._bind("sensordata")
         self.actuator_force = self._bind("actuator_force")
+        self.history = self._bind("history") if model.nhistory else torch.zeros(num_envs, 0)
         self._state = self._batch.bind("state")
         self._time = self._batch.bind("time")
         self._warnings = torch.from_numpy(self._batch.bind("warning"))

@@ -35,11 +35,11 @@ def _play(footfalls, found, vel_z=None, clearance=None, foot=(0, 0)):
     assert len(found) == len(vel_z) == len(clearance) * DECIMATION
     results = []
     for i, height in enumerate(clearance):
-        footfalls.begin()
-        for j in range(i * DECIMATION, (i + 1) * DECIMATION):
-            vel, contacts = torch.zeros(num_envs, 4), torch.zeros(num_envs, 4)
-            vel[foot], contacts[foot] = vel_z[j], 2.0 * (found[j] == "#")
-            footfalls.record(vel, contacts)
+        vel, contacts = torch.zeros(2, DECIMATION, num_envs, 4)
+        for j in range(DECIMATION):
+            row = i * DECIMATION + j
+            vel[j][foot], contacts[j][foot] = vel_z[row], 2.0 * (found[row] == "#")
+        footfalls.record(vel, contacts)
         heights = torch.zeros(num_envs, 4)
         heights[foot] = height
         footfalls.update(heights)

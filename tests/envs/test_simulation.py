@@ -7,7 +7,7 @@ import math
 import pytest
 import torch
 
-from envs.scene import SceneCfg, build_scene, sensor_slice
+from envs.scene import SceneCfg, build_scene, sensor_history, sensor_slice
 from envs.simulation import BatchSimulation, make_simulation
 
 MODEL = build_scene(SceneCfg())
@@ -242,3 +242,26 @@ def test_a_state_of_another_number_of_robots_is_refused():
 def test_a_device_without_engine_is_refused():
     with pytest.raises(ValueError, match="cuda"):
         make_simulation(MODEL, 2, device="cuda")
+
+
+@pytest.mark.parametrize("samples", [1, 4])
+def test_one_call_keeps_what_each_of_its_steps_read(samples):
+    model = build_scene(SceneCfg(), foot_samples=samples)
+    single, several = (BatchSimulation(model, 2, num_threads=1) for _ in range(2))
+    columns, kept, size = sensor_history(model, "FR_foot_vel", 4)
+    assert (kept, size) == (samples, 3)
+    past = several.history[:, columns].unflatten(1, (4, -1))[:, :, 2 + samples :]
+    now = single.sensordata[:, sensor_slice(model, "FR_foot_vel", 4)]
+    for call in range(5):
+        read = []
+        for _ in range(samples):
+            single.step()
+            read.append(now.clone())
+        several.step(samples)
+        expected = torch.stack(read, dim=1).view(2, samples, 4, 3).transpose(1, 2)
+        assert torch.equal(past.unflatten(2, (samples, 3)), expected)
+        assert bool((expected != 0.0).any()) == (call > 0 or samples > 1)
+        for simulation in (single, several):
+            if call == 2:  # a ring of a simulation that begins anew begins anew as well
+                simulation.reset(torch.tensor([False, True]), keyframe=0)
+            simulation.forward()  # is no step, and leaves no reading
