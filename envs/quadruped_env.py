@@ -7,6 +7,7 @@ observations. What a reward or an observation is stands in its own module; learn
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -135,6 +136,8 @@ class QuadrupedEnv(VecEnv):
         self.autoreset = True
         """Whether `step` resets finished robots; without, it returns what they saw last, and the
         caller resets them with `reset`."""
+        self.on_physics_step: Callable[[], None] | None = None
+        """Called after every physics step, with the engine's state of that step to be read."""
         self.step_dt = cfg.step_dt
         self.max_episode_length = math.ceil(cfg.episode_length / cfg.step_dt)
         self.generator = torch.Generator().manual_seed(cfg.seed)
@@ -289,7 +292,12 @@ class QuadrupedEnv(VecEnv):
         """Run the physics of one control step and record the feet at every physics step."""
         simulation = self.simulation
         torch.add(self.stand, self.action, alpha=self.cfg.action_scale, out=simulation.ctrl)
-        simulation.step(self.cfg.decimation)
+        if self.on_physics_step is None:
+            simulation.step(self.cfg.decimation)
+        else:
+            for _ in range(self.cfg.decimation):
+                simulation.step()
+                self.on_physics_step()
         self.footfalls.record(self._foot_vel_z_history, self._foot_contact_history)
         self.unstable = simulation.unstable()
         if bool(self.unstable.any()):
@@ -454,6 +462,11 @@ class QuadrupedEnv(VecEnv):
         log["Gait/duty_factor"] = self.footfalls.contact_share.mean()
         beta = command[:, 3]
         for name, chosen in (("low_beta", beta < 0.25), ("high_beta", beta > 0.75)):
+            # The sound energy of landings goes with the square of their speed: its sum over time is
+            # logged, with the silent steps in it. Sliding feet and motors are not in it.
+            if bool(chosen.any()):
+                per_robot = self.footfalls.landing_speed[chosen].square().sum() / chosen.sum()
+                log[f"Gait/landing_power_{name}"] = per_robot / self.step_dt
             landed = self.footfalls.touchdown & chosen.unsqueeze(1)
             if bool(landed.any()):
                 log[f"Gait/landing_speed_{name}"] = self.footfalls.landing_speed[landed].mean()

@@ -47,6 +47,9 @@ Solver = Literal["newton", "cg"]
 _VISUAL_GROUP = 2
 """Geom group of shapes only looked at; collision shapes are in group 3, hidden by default."""
 
+_PATCH_THICKNESS = 0.1
+"""Thickness of a patch of floor, in m; its top is level."""
+
 _ROBOT_FILE = Path(__file__).resolve().parents[1] / "resources" / "go1" / "go1.xml"
 
 _INTEGRATORS: dict[Integrator, mujoco.mjtIntegrator] = {
@@ -62,6 +65,35 @@ _SOLVERS: dict[Solver, mujoco.mjtSolver] = {
     "newton": mujoco.mjtSolver.mjSOL_NEWTON,
     "cg": mujoco.mjtSolver.mjSOL_CG,
 }
+
+
+@dataclass(frozen=True)
+class FloorPatch:
+    """A rectangle of floor with its own contact parameters; a bad value raises `ValueError`."""
+
+    low: tuple[float, float]
+    """Corner with the smallest x and y, in m."""
+
+    high: tuple[float, float]
+    """Corner with the largest x and y, in m."""
+
+    friction: float
+    """Sliding friction coefficient."""
+
+    solref: tuple[float, float]
+    """Time constant (s) and damping ratio."""
+
+    rgba: tuple[float, float, float, float] = (0.6, 0.6, 0.6, 1.0)
+    """Colour in pictures."""
+
+    def __post_init__(self) -> None:
+        """Refuse an empty or endless rectangle, and contact parameters out of their range."""
+        corners = (*self.low, *self.high)
+        ordered = self.low[0] < self.high[0] and self.low[1] < self.high[1]
+        if not (ordered and all(math.isfinite(value) for value in corners)):
+            raise ValueError(f"a patch needs low < high in x and y, got {self.low} and {self.high}")
+        _require_number("friction", self.friction, low=0.0, high=10.0)
+        _require_solref("solref", self.solref)
 
 
 class SceneError(RuntimeError):
@@ -96,6 +128,13 @@ class SceneCfg:
     floor_solref: tuple[float, float] = (0.02, 1.0)
     """Time constant (s) and damping ratio of every contact with the floor."""
 
+    floor_patches: tuple[FloorPatch, ...] = ()
+    """Floors side by side, level with each other; none leaves one endless floor."""
+
+    foot_forces: bool = False
+    """Whether to measure what sound needs and walking does not: contact forces and turning rates
+    of the feet."""
+
     look: Look = "primitives"
     """Shapes to show: our own, or the meshes of the `mujoco_menagerie` package."""
 
@@ -108,17 +147,9 @@ class SceneCfg:
         _require_count("iterations", self.iterations)
         _require_count("ls_iterations", self.ls_iterations)
         _require_number("floor_friction", self.floor_friction, low=0.0, high=10.0)
-        if len(self.floor_solref) != 2:
-            raise ValueError(
-                f"floor_solref is {self.floor_solref!r}: it takes two numbers,"
-                " a time constant (s) and a damping ratio"
-            )
-        # Below two physics steps MuJoCo would stretch the time constant without a word (refsafe).
-        time_constant, damping_ratio = self.floor_solref
-        _require_number(
-            "floor_solref[0]", time_constant, low=2 * self.timestep, high=1.0, closed=True
-        )
-        _require_number("floor_solref[1]", damping_ratio, low=0.0, high=10.0)
+        _require_solref("floor_solref", self.floor_solref, self.timestep)
+        for index, patch in enumerate(self.floor_patches):
+            _require_solref(f"floor_patches[{index}].solref", patch.solref, self.timestep)
         _require_choice("look", self.look, get_args(Look))
 
 
@@ -151,11 +182,15 @@ def make_spec(cfg: SceneCfg, foot_samples: int = 0) -> mujoco.MjSpec:
     _set_options(spec, cfg)
     _add_surroundings(spec)
     _add_floor(spec, cfg)
+    for patch in cfg.floor_patches:
+        _add_patch(spec, patch)
     _add_foot_sensors(spec)
     _add_contact_sensors(spec)
     for leg in LEGS:
         for quantity in ("vel", "contact"):
             spec.sensor(f"{leg}_foot_{quantity}").nsample = foot_samples
+    if cfg.foot_forces:
+        _add_force_sensors(spec)
     if cfg.look == "menagerie":
         _dress_in_menagerie(spec)
     return spec
@@ -217,6 +252,19 @@ def _require_number(
             f"{name} is {value!r}: it must be {'at least' if closed else 'above'} {low:g}"
             f" and at most {high:g}"
         )
+
+
+def _require_solref(name: str, solref: tuple[float, float], timestep: float | None = None) -> None:
+    """Refuse a contact reference out of its range, for any time step or for the one given (s)."""
+    if len(solref) != 2:
+        raise ValueError(
+            f"{name} is {solref!r}: it takes two numbers, a time constant (s) and a damping ratio"
+        )
+    time_constant, damping_ratio = solref
+    # Below two physics steps MuJoCo would stretch the time constant without a word (refsafe).
+    low = 0.0 if timestep is None else 2 * timestep
+    _require_number(f"{name}[0]", time_constant, low=low, high=1.0, closed=timestep is not None)
+    _require_number(f"{name}[1]", damping_ratio, low=0.0, high=10.0)
 
 
 def _require_count(name: str, value: int) -> None:
@@ -290,6 +338,8 @@ def _add_floor(spec: mujoco.MjSpec, cfg: SceneCfg) -> None:
     spec.worldbody.add_geom(
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
+        # Under patches the endless floor is but a backdrop: level, it would touch as well.
+        pos=(0.0, 0.0, -_PATCH_THICKNESS if cfg.floor_patches else 0.0),
         size=(0.0, 0.0, 0.05),
         material="floor",
         contype=1,
@@ -299,6 +349,24 @@ def _add_floor(spec: mujoco.MjSpec, cfg: SceneCfg) -> None:
         priority=1,
         friction=(cfg.floor_friction, 0.02, 0.01),
         solref=cfg.floor_solref,
+    )
+
+
+def _add_patch(spec: mujoco.MjSpec, patch: FloorPatch) -> None:
+    """Add a slab whose top is at height 0."""
+    (x0, y0), (x1, y1) = patch.low, patch.high
+    half = 0.5 * _PATCH_THICKNESS
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=(0.5 * (x0 + x1), 0.5 * (y0 + y1), -half),
+        size=(0.5 * (x1 - x0), 0.5 * (y1 - y0), half),
+        rgba=patch.rgba,
+        contype=1,
+        conaffinity=0,
+        condim=3,
+        priority=1,  # as for the endless floor
+        friction=(patch.friction, 0.02, 0.01),
+        solref=patch.solref,
     )
 
 
@@ -329,6 +397,26 @@ def _add_contact_sensors(spec: mujoco.MjSpec) -> None:
             objname=geom,
             # What to report (found), how to choose among contacts (any), how many to report.
             intprm=(1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1),
+        )
+
+
+def _add_force_sensors(spec: mujoco.MjSpec) -> None:
+    """Add, for every foot, the net contact force (N) and the angular velocity (rad/s), world."""
+    for leg in LEGS:
+        spec.add_sensor(
+            name=f"{leg}_foot_force",
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_GEOM,
+            objname=f"{leg}_foot",
+            # What to report (force), how to reduce (net force, world frame), how many to report.
+            intprm=(1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1),
+        )
+    for leg in LEGS:
+        spec.add_sensor(
+            name=f"{leg}_foot_angvel",
+            type=mujoco.mjtSensor.mjSENS_FRAMEANGVEL,
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            objname=f"{leg}_foot",
         )
 
 

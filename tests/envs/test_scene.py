@@ -16,6 +16,7 @@ from envs.scene import (
     LEGS,
     STAND_HEIGHT,
     STAND_JOINT_POS,
+    FloorPatch,
     SceneCfg,
     SceneError,
     build_scene,
@@ -461,6 +462,31 @@ def test_a_slippery_floor_decides_over_the_rubber_feet():
     assert data.ncon > 0
     assert data.contact.friction[0, 0] == pytest.approx(0.3)
     np.testing.assert_allclose(data.contact.solref[0], (0.05, 0.8))
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"low": (1.0, 0.0)}, "low < high"),
+        ({"high": (math.inf, 1.0)}, "low < high"),
+        ({"friction": 0.0}, "^friction is 0.0: .* above 0"),
+        ({"friction": math.nan}, "^friction is nan"),
+        ({"solref": (0.0, 1.0)}, r"^solref\[0\] is 0.0: .* above 0"),
+        ({"solref": (0.02, -1.0)}, r"^solref\[1\] is -1.0: .* above 0"),
+        ({"solref": (0.02,)}, "^solref is .* two numbers"),
+    ],
+)
+def test_a_patch_refuses_a_bad_value_by_name(values, message):
+    good = {"low": (0.0, 0.0), "high": (1.0, 1.0), "friction": 0.8, "solref": (0.02, 1.0)}
+    with pytest.raises(ValueError, match=message):
+        FloorPatch(**(good | values))
+
+
+def test_a_patch_stiffer_than_the_physics_steps_allow_is_refused_by_its_index():
+    soft, hard = (FloorPatch((0.0, 0.0), (1.0, 1.0), 0.8, (time, 1.0)) for time in (0.02, 0.008))
+    SceneCfg(timestep=0.004, floor_patches=(soft, hard))
+    with pytest.raises(ValueError, match=r"floor_patches\[1\]\.solref\[0\] .* at least 0\.01"):
+        SceneCfg(timestep=0.005, floor_patches=(soft, hard))
 
 
 # Menagerie's meshes.

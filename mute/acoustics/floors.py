@@ -1,0 +1,193 @@
+"""The floors: what a foot feels of them, and how they sound.
+
+Each figure carries its source, or is marked as chosen. Chosen figures set the character of a floor
+(a carpet is soft and damped, a board rings low, a tile is hard and bright); the level is set by
+calibration with one gain a floor, and is therefore not a claim of this table. Sources:
+
+- friction: dry rubber slides on concrete at 0.6 to 0.85 (collected handbooks, The Physics Factbook,
+  hypertextbook.com/facts/2006/MatthewMichaels.shtml). The others lie around it and around the 0.8
+  that policies are trained with.
+- stiffness of the foot: Hertz' contact of a sphere with a plane, F = 4/3 E* sqrt(R) d^(3/2), of
+  radius R = 23 mm (Go1) and a rubber of 60 Shore A, E = 3.6 MPa by Gent (1958), Poisson's ratio
+  1/2, E* = 4.8 MPa: between 45 kN/m (secant) and 68 kN/m (tangent) at 100 N.
+- decay: constant internal friction eta, d = pi f eta and T60 = ln(1000) / d (Wildes and Richards
+  1988; Klatzky, Pai and Krotkov, Presence 9(4), 2000, on which materials are heard by). Dense
+  concrete as a material has an eta of the order of 0.01 (NPTEL 112104040, table 9.1); a floor that
+  is built in and loaded loses more.
+- restitution: a ball rebounds from carpet with 0.92 of the speed that it rebounds from wood with
+  (heights of 44 and 52 cm out of 100 cm, studymode.com, essay 109460); the rest is chosen low, as a
+  leg gives way.
+
+What the numbers do in sound is the work of `impacts` and `scuffing`; putting friction and `solref`
+into a model is that of the environments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import log, pi
+
+__all__ = ["FLOORS", "FOOT_STIFFNESS", "Floor", "Mode", "find_floors"]
+
+FOOT_STIFFNESS = 6e4
+"""Linear stiffness of the rubber foot, N/m (see above: Hertz, linearised)."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One damped mode of a floor, as it is heard."""
+
+    frequency: float
+    """Hz."""
+    decay_time: float
+    """Time to fall by 60 dB, T60, s."""
+    gain: float
+    """Amplitude a of its response to an impulse of 1 N s, a exp(-d t) (cos w t - d/w sin w t), as
+    pressure times distance: Pa m / (N s)."""
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A floor's physics and its sound."""
+
+    name: str
+    friction: float
+    """Sliding friction coefficient of the rubber foot on it."""
+    solref: tuple[float, float]
+    """MuJoCo's contact reference: time constant, s, and damping ratio."""
+    stiffness: float
+    """Local stiffness under a foot, N/m."""
+    restitution: float
+    """Ratio e of rebound to approach speed of a foot."""
+    modes: tuple[Mode, ...]
+    """The modes that radiate, lowest first."""
+    scuff_band: tuple[float, float]
+    """Lower and upper 3 dB edge of the noise of a sliding foot, Hz."""
+    scuff_efficiency: float
+    """Radiated sound power over friction power."""
+    colour: tuple[float, float, float]
+    """Red, green and blue of 0 to 1, for pictures and maps."""
+
+    @property
+    def contact_stiffness(self) -> float:
+        """Stiffness of foot and floor in series, N/m."""
+        return 1.0 / (1.0 / FOOT_STIFFNESS + 1.0 / self.stiffness)
+
+
+def _modes(loss_factor: float, scale: float, *modes: tuple[float, float]) -> tuple[Mode, ...]:
+    """Return modes of one internal friction, from their frequencies and relative weights.
+
+    Gains rise with the square of the frequency, by which a contact's spectrum falls, so that the
+    weights are what one hears of each mode.
+    """
+    return tuple(
+        Mode(
+            frequency,
+            log(1e3) / (pi * frequency * loss_factor),
+            scale * weight * (frequency / 1e3) ** 2,
+        )
+        for frequency, weight in modes
+    )
+
+
+FLOORS: dict[str, Floor] = {
+    floor.name: floor
+    for floor in (
+        Floor(
+            name="wood",  # boards or parquet on joists
+            friction=0.8,  # chosen: as in training
+            solref=(0.015, 1.0),  # chosen: somewhat harder than the 0.02 s of training
+            stiffness=1e6,  # chosen: a board between two joists bends
+            restitution=0.40,  # chosen
+            # Chosen: a low, dense bank that rings ("hollow"); eta 0.06 as built, chosen.
+            modes=_modes(
+                0.06,
+                160.0,
+                (92.0, 1.0),
+                (151.0, 1.0),
+                (243.0, 1.0),
+                (367.0, 1.0),
+                (548.0, 0.8),
+                (821.0, 0.6),
+                (1240.0, 0.4),
+                (1930.0, 0.25),
+            ),
+            scuff_band=(250.0, 2000.0),  # chosen
+            scuff_efficiency=5e-7,  # chosen
+            colour=(0.72, 0.53, 0.34),
+        ),
+        Floor(
+            name="carpet",  # tufted carpet with its backing, on a slab
+            friction=0.9,  # chosen: pile interlocks with the rubber
+            solref=(0.025, 1.0),  # chosen: softer than training
+            # Chosen: softer than the foot. With the 0.38 to 0.67 kg of a landing foot a contact
+            # takes 15 to 19 ms here, and 8 to 11 ms on the hard floors.
+            stiffness=2.5e4,
+            restitution=0.37,  # 0.92 of wood
+            # Chosen: three dull thuds, gone after a few periods; eta 0.4, chosen.
+            modes=_modes(0.4, 1600.0, (85.0, 1.0), (190.0, 1.0), (410.0, 0.8)),
+            scuff_band=(400.0, 4000.0),  # chosen: pile brushing
+            scuff_efficiency=3e-7,  # chosen
+            colour=(0.42, 0.47, 0.60),
+        ),
+        Floor(
+            name="tile",  # porcelain tiles bedded on screed
+            friction=0.7,  # chosen: smooth glaze, dry
+            solref=(0.010, 1.0),  # chosen: hard
+            stiffness=2e7,  # chosen: much harder than the foot
+            restitution=0.45,  # chosen
+            # Chosen: bright, with a clack of a tenth of a second; eta 0.025, chosen.
+            modes=_modes(
+                0.025,
+                100.0,
+                (430.0, 0.4),
+                (712.0, 0.6),
+                (1090.0, 1.0),
+                (1660.0, 1.0),
+                (2410.0, 1.0),
+                (3380.0, 0.8),
+                (4720.0, 0.6),
+            ),
+            scuff_band=(1000.0, 6000.0),  # chosen: squeak and hiss
+            scuff_efficiency=7e-7,  # chosen
+            colour=(0.85, 0.85, 0.82),
+        ),
+        Floor(
+            name="concrete",  # a bare trowelled slab
+            friction=0.75,  # middle of the 0.6 to 0.85 above
+            solref=(0.008, 1.0),  # chosen: the hardest; above twice a step of 4 ms
+            stiffness=1e8,  # chosen: rigid beside the foot
+            restitution=0.45,  # chosen
+            # Chosen: bright too, but a thick slab has its modes elsewhere and loses energy into the
+            # ground; eta 0.05, chosen five times that of the material.
+            modes=_modes(
+                0.05,
+                155.0,
+                (285.0, 0.6),
+                (590.0, 1.0),
+                (940.0, 1.0),
+                (1420.0, 0.8),
+                (2050.0, 0.6),
+                (2980.0, 0.4),
+            ),
+            scuff_band=(600.0, 5000.0),  # chosen: grit
+            scuff_efficiency=8e-7,  # chosen
+            colour=(0.60, 0.60, 0.60),
+        ),
+    )
+}
+"""The floors by name."""
+
+
+def find_floors(names: Iterable[str]) -> tuple[Floor, ...]:
+    """Return the floors of these names, in their order.
+
+    Raises:
+        ValueError: If a floor is not known.
+    """
+    names = tuple(names)
+    for name in names:
+        if name not in FLOORS:
+            raise ValueError(f"floor {name!r} is not known; use one of {', '.join(FLOORS)}")
+    return tuple(FLOORS[name] for name in names)

@@ -1,0 +1,36 @@
+"""The calibration that ships: one gain a floor, with where it comes from."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+from mute.acoustics.floors import FLOORS
+from mute.errors import MuteError
+
+__all__ = ["GAINS_FILE", "load_gains"]
+
+GAINS_FILE = Path(__file__).resolve().parents[2] / "resources" / "acoustics" / "calibration.json"
+"""Made by `python -m mute.acoustics.calibration`."""
+
+
+def load_gains(path: Path = GAINS_FILE) -> dict[str, float]:
+    """Return the gain of each floor.
+
+    Raises:
+        MuteError: If the file is missing, broken, or lacks a floor.
+    """
+    try:
+        floors = json.loads(path.read_text())["floors"]
+        gains = {name: float(floors[name]["gain"]) for name in FLOORS}
+    except OSError as error:
+        raise MuteError(f"cannot read the calibration {path}: {error.strerror}") from error
+    except KeyError as error:
+        raise MuteError(f"{path} is no calibration: {error} is missing") from error
+    except (TypeError, ValueError) as error:
+        raise MuteError(f"{path} is no calibration: {error}") from error
+    for name, gain in gains.items():
+        if not 0.0 < gain < math.inf:
+            raise MuteError(f"{path}: the gain of {name} must be > 0, got {gain}")
+    return gains

@@ -1,0 +1,353 @@
+"""Robots that are heard as they walk: recorder, sound and meter in one.
+
+A `Listener` follows an environment step by step. It works in stretches, so that its memory does
+not grow with the walk but for the readings of the level, and the sound of robots can be kept as
+WAV files on the way. What a robot does between a fall and the time at which it walks again is
+heard, but is in no figure.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from envs.quadruped_env import QuadrupedEnv
+from mute.acoustics.contacts import ContactBlock
+from mute.acoustics.energy import EnergyMeter
+from mute.acoustics.levels import settling_time
+from mute.acoustics.microphone import Microphone
+from mute.acoustics.recorder import FloorAt, Recorder
+from mute.acoustics.sound_level_meter import SoundLevelMeter
+from mute.acoustics.soundscape import SOURCES, Soundscape
+from mute.errors import MuteError
+
+__all__ = ["SAMPLE_RATE", "WAV_FULL_SCALE", "HeardLevels", "Listener", "WavFile"]
+
+SAMPLE_RATE = 48000
+"""Of all sound that is made here, Hz."""
+
+WAV_FULL_SCALE = 4.0
+"""Sound pressure of a full-scale sample in a WAV file, Pa. Always the same, so that a quiet walk
+sounds quiet beside a loud one; 4 Pa is a peak of 106 dB."""
+
+_LONGEST_FILE = 43200 * SAMPLE_RATE
+"""Samples at which a file ends though the walk goes on: a WAV file holds 4 GiB, 12 hours."""
+
+
+@dataclass(frozen=True)
+class HeardLevels:
+    """Figures of one robot over the time that counts, dBA re 20 uPa; NaN where there was none."""
+
+    mnl: float
+    """Mean of the readings."""
+    pnl: float
+    """Largest reading."""
+    laeq: float
+    """Level of the mean square."""
+
+
+class Listener:
+    """Hears robots of an environment at a microphone of each one's own, and measures the level.
+
+    A context manager: the files of the sound are whole however the walk ends.
+
+    The figures leave out `settle_time` from the start, and for each robot the step of a fall (or of
+    a simulation that blew up) and `settle_time` after it. The detector remembers what was before;
+    so readings count only once it has settled too, as at the start of any recording.
+    """
+
+    def __init__(
+        self,
+        env: QuadrupedEnv,
+        floors: Sequence[str],
+        floor_at: FloorAt | int = 0,
+        microphone: Microphone | None = None,
+        gains: Mapping[str, float] | None = None,
+        sources: Sequence[str] = SOURCES,
+        settle_time: float = 1.0,
+        seed: int = 0,
+        wav: Path | Mapping[int, Path] | None = None,
+        stretch: float = 0.5,
+        robots: slice | None = None,
+        from_energies: bool = False,
+        wav_start: float | None = None,
+    ) -> None:
+        """Begin to listen.
+
+        Args:
+            env: The environment, with `scene.foot_forces`; call `listen` after each of its steps.
+            floors: Names of the floors, in the order of their indices.
+            floor_at: Index of the floor under world positions, see `Recorder`.
+            microphone: Where to listen. Default: on the trunk.
+            gains: Calibration gain by floor. Default: 1.
+            sources: What to hear, of `soundscape.SOURCES`.
+            settle_time: Time that the figures leave out, at the start and after each fall, s.
+            seed: Of all noise.
+            wav: File for the sound of the first robot, or files by robot; they begin on entering.
+            stretch: Time that is worked on at once, s.
+            robots: Which robots to hear, counted from the first of them; None for all.
+            from_energies: Take the levels from `EnergyMeter`, without making sound that no file
+                wants. Files change no figure then.
+            wav_start: Time at which the sound in the files begins, s. Default: `settle_time`.
+
+        Raises:
+            ValueError: If a floor, a source or a gain is not allowed, or the environment does not
+                measure what is needed.
+        """
+        self.clipped: dict[Path, int] = {}
+        """Samples beyond full scale in each file, once it is complete."""
+        self._env = env
+        self._robots = robots or slice(None)
+        self._count = len(range(env.num_envs)[self._robots])
+        self._recorder = Recorder(env, floor_at, robots)
+        self._make_energy_meter = None
+        if from_energies:
+            self._make_energy_meter = lambda: EnergyMeter(
+                self._count, floors, microphone, sources, gains
+            )
+        self._paths = {0: wav} if isinstance(wav, Path) else dict(wav or {})
+        self._files: dict[int, WavFile] = {}
+        self._closing = contextlib.ExitStack()
+        self._soundscape = None
+        if self._paths or not from_energies:
+            self._soundscape = Soundscape(
+                self._count, floors, microphone, SAMPLE_RATE, seed, sources, gains
+            )
+        self._settle_steps = round(settle_time / env.step_dt)
+        self._read_steps = self._settle_steps + math.ceil(settling_time("fast") / env.step_dt)
+        self._steps_at_once = max(1, round(stretch / env.step_dt))
+        start = self._settle_steps * env.step_dt if wav_start is None else wav_start
+        self._skipped = round(start * SAMPLE_RATE)
+        self._ages: list[NDArray[np.int64]] = []
+        self.restart()
+
+    def __enter__(self) -> Listener:
+        """Begin the files, if there are to be any.
+
+        Raises:
+            MuteError: If one cannot be written.
+        """
+        with contextlib.ExitStack() as opened:
+            for robot, path in self._paths.items():
+                self._files[robot] = WavFile(path)
+                opened.callback(self._close_file, robot)
+            self._closing = opened.pop_all()
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Work off what is left and complete the files; the figures remain.
+
+        Raises:
+            MuteError: If one cannot be written.
+        """
+        with self._closing:
+            self._recorder.close()
+            # What was interrupted may have left half a control step behind. Then the rest, less
+            # than a stretch, is given up.
+            if exc_type is None:
+                self._work()
+
+    def restart(self) -> None:
+        """Measure anew, of robots that are about to be reset; sound that is kept goes on."""
+        self._work()
+        self._recorder.restart(np.ones(self._count, dtype=bool))
+        self._meter = (
+            SoundLevelMeter(SAMPLE_RATE, self._count)
+            if self._make_energy_meter is None
+            else self._make_energy_meter()
+        )
+        self._steps = 0
+        self._age = np.zeros(self._count, dtype=np.int64)
+        self._kept = np.zeros((self._count, 0), dtype=bool)
+        self._counting = np.zeros(self._count, dtype=bool)
+        # Rows: exposure in the square of the reference pressure times s, and time in s.
+        self._tally, self._tallied = np.zeros((2, self._count)), np.zeros((2, self._count))
+
+    def listen(self, dones: torch.Tensor) -> None:
+        """Hear the control step that the environment has just made.
+
+        Args:
+            dones: Episodes that ended in it. Shape: (num_envs,).
+        """
+        ended = dones.numpy()[self._robots]
+        self._age += 1
+        self._age[ended] = 0
+        self._ages.append(self._age.copy())
+        if ended.any():
+            self._recorder.restart(ended, self._env.unstable.numpy()[self._robots])
+        if len(self._ages) >= self._steps_at_once:
+            self._work()
+
+    def level(self) -> float:
+        """Return what the meter of the first robot shows now, dBA; NaN before a first step."""
+        self._work()
+        return float(self._meter.detector.level[0]) if self._steps else math.nan
+
+    def levels(self) -> list[HeardLevels]:
+        """Return the figures of each robot, without the last stretch until the listener is left."""
+        self._add_up()
+        return [
+            HeardLevels(
+                mnl=float(own.mean()) if len(own) else math.nan,
+                pnl=float(own.max()) if len(own) else math.nan,
+                laeq=_decibels(exposure / seconds) if seconds > 0.0 else math.nan,
+            )
+            for own, exposure, seconds in zip(
+                (row[kept] for row, kept in zip(self._all_readings(), self._kept, strict=True)),
+                *self._tally,
+                strict=True,
+            )
+        ]
+
+    def readings(self) -> NDArray[np.float64]:
+        """Return the Fast levels at `reading_times`, dBA; NaN where they are in no figure.
+
+        Shape: (robots, readings).
+        """
+        return np.where(self._kept, self._all_readings(), math.nan)
+
+    def reading_times(self) -> NDArray[np.float64]:
+        """Return the times of the readings since listening began, s. Shape: (readings,)."""
+        return self._meter.detector.reading_times if self._steps else np.zeros(0)
+
+    def _all_readings(self) -> NDArray[np.float64]:
+        return self._meter.detector.readings if self._steps else np.zeros((self._count, 0))
+
+    def _work(self) -> None:
+        """Measure, and write, what has been recorded since the last time."""
+        if not self._ages:
+            return
+        ages = np.array(self._ages)
+        self._ages.clear()
+        block = self._recorder.take()
+        counts = ages > self._settle_steps
+        changes = np.flatnonzero((counts[1:] != counts[:-1]).any(axis=1)) + 1
+        length = block.steps // len(ages)
+        for first, stop in pairwise([0, *changes.tolist(), len(ages)]):
+            if not np.array_equal(counts[first], self._counting):
+                self._add_up()
+                self._counting = counts[first]
+            self._hear(block.part(first * length, stop * length))
+        self._choose_readings(ages)
+        self._steps += len(ages)
+
+    def _hear(self, block: ContactBlock) -> None:
+        pressure = self._render(block)
+        if isinstance(self._meter, EnergyMeter):
+            self._meter.update(block)
+        elif pressure is not None:
+            self._meter.update(pressure)
+        if pressure is not None and self._files:
+            begin = min(self._skipped, pressure.shape[1])
+            self._skipped -= begin
+            for robot, file in self._files.items():
+                file.write(pressure[robot, begin:])
+
+    def _render(self, block: ContactBlock) -> NDArray[np.float32] | None:
+        return None if self._soundscape is None else self._soundscape.render(block)
+
+    def _add_up(self) -> None:
+        """Add what came since the last time to the tally of the robots for which it counts."""
+        try:
+            results = self._meter.result()
+        except ValueError:  # nothing came
+            return
+        seconds = np.array([levels.seconds for levels in results])
+        exposure = 10.0 ** (0.1 * np.array([levels.laeq for levels in results])) * seconds
+        totals = np.stack((exposure, seconds))
+        self._tally += np.where(self._counting, totals - self._tallied, 0.0)
+        self._tallied = totals
+
+    def _choose_readings(self, ages: NDArray[np.int64]) -> None:
+        """Tell which of the new readings count: those in steps of robots that are old enough."""
+        new = self._meter.detector.reading_times[self._kept.shape[1] :]
+        # A reading at the end of a step is that step's.
+        step = np.ceil(new / self._env.step_dt - 1e-6).astype(np.int64) - 1 - self._steps
+        kept = (ages >= self._read_steps)[step].T
+        self._kept = np.concatenate((self._kept, kept), axis=1)
+
+    def _close_file(self, robot: int) -> None:
+        file = self._files.pop(robot)
+        file.close()
+        self.clipped[file.path] = file.clipped
+
+
+class WavFile:
+    """A mono WAV file of 16 bits that grows as samples come; what came is whole after `close`."""
+
+    def __init__(self, path: Path) -> None:
+        """Open the file.
+
+        Raises:
+            MuteError: If it cannot be written.
+        """
+        self.path = path
+        self.clipped = 0
+        """Samples beyond full scale, cut off."""
+        self._samples = 0
+        with self._told():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = path.open("wb")
+            self._file.write(_wav_header(0))
+
+    def write(self, pressure: NDArray) -> None:
+        """Append samples in Pa, up to the longest that a file can be. Shape: (samples,).
+
+        Raises:
+            MuteError: If they cannot be written.
+        """
+        pressure = pressure[: _LONGEST_FILE - self._samples]
+        self._samples += len(pressure)
+        scaled = np.rint(pressure * (32767.0 / WAV_FULL_SCALE))
+        self.clipped += int(np.count_nonzero(np.abs(scaled) > 32767.0))
+        with self._told():
+            self._file.write(np.clip(scaled, -32767.0, 32767.0).astype("<i2").tobytes())
+
+    def close(self) -> None:
+        """Complete the file.
+
+        Raises:
+            MuteError: If it cannot be written.
+        """
+        # Not with `wave`, which would leave a traceback behind where the file cannot be completed.
+        with self._told(), self._file:
+            self._file.seek(0)
+            self._file.write(_wav_header(self._samples))
+
+    @contextlib.contextmanager
+    def _told(self) -> Iterator[None]:
+        """Turn what the system says of the file into one line."""
+        try:
+            yield
+        except OSError as error:
+            raise MuteError(f"cannot write {self.path}: {error.strerror}") from error
+
+
+def _wav_header(samples: int) -> bytes:
+    """Return what precedes the samples of a mono file of 16 bits."""
+    return struct.pack(
+        "<4sI4s4sIHHIIHH4sI",
+        *(b"RIFF", 36 + 2 * samples, b"WAVE"),
+        # Size of the format, PCM, channels, samples and bytes a second, bytes and bits a sample.
+        *(b"fmt ", 16, 1, 1, SAMPLE_RATE, 2 * SAMPLE_RATE, 2, 16),
+        *(b"data", 2 * samples),
+    )
+
+
+def _decibels(ratio: float) -> float:
+    return 10.0 * math.log10(ratio) if ratio > 0.0 else -math.inf

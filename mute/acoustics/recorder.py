@@ -1,0 +1,244 @@
+"""From physics to sound: what an environment's robots do, read at every physics step.
+
+Nothing is sampled at the control rate: a landing peak lasts 15 to 25 ms. The recorder only copies
+while the physics runs; a block is worked out when it is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from envs.quadruped_env import QuadrupedEnv
+from envs.scene import FOOT_RADIUS, LEGS, sensor_slice
+from mute.acoustics.contacts import ContactBlock, Impacts
+
+__all__ = ["Recorder", "effective_mass"]
+
+_RELEASE = 0.005
+"""Time without contact after which the next contact is an impact, s. The solver may drop a contact
+that carries little load for a step or two; a foot that is off the ground that shortly cannot have
+gathered speed."""
+
+_CREEP = 0.02
+"""Sliding speed up to which a foot counts as sticking, m/s. MuJoCo's friction is soft: a foot that
+carries load creeps, where a real one stands."""
+
+FloorAt = Callable[[NDArray[np.floating]], NDArray[np.integer]]
+
+
+class Recorder:
+    """Copies the state of every physics step of an environment, and makes blocks of it.
+
+    The environment needs `scene.foot_forces`. A robot that begins anew in between jumps, drops and
+    lands: whoever resets robots calls `restart`.
+    """
+
+    def __init__(
+        self, env: QuadrupedEnv, floor_at: FloorAt | int = 0, robots: slice | None = None
+    ) -> None:
+        """Begin to record.
+
+        Args:
+            env: The environment; its `on_physics_step` is taken.
+            floor_at: Index of the floor under world positions of shape (..., 2) in m, as an array
+                of shape (...), or one index for everywhere.
+            robots: Which robots to record, in blocks that count from the first of them; None for
+                all.
+
+        Raises:
+            ValueError: If the environment does not measure what is needed.
+        """
+        if not env.cfg.scene.foot_forces:
+            raise ValueError("recording needs env.scene.foot_forces")
+        self.timestep = env.cfg.scene.timestep
+        """Physics step, s."""
+        self._env = env
+        self._model = env.model
+        self._data = mujoco.MjData(env.model)
+        self._floor_at = floor_at
+        feet = len(LEGS)
+        self._columns = {
+            name: sensor_slice(env.model, f"{LEGS[0]}_foot_{name}", feet)
+            for name in ("pos", "vel", "contact", "force", "angvel")
+        }
+        simulation = env.simulation
+        self._live = {
+            name: getattr(simulation, name).numpy()[robots or slice(None)]
+            for name in ("sensordata", "qpos", "qvel", "actuator_force")
+        }
+        self._rows: dict[str, list[NDArray]] = {name: [] for name in self._live}
+        self._release = max(1, round(_RELEASE / self.timestep))
+        self._last_qpos = self._live["qpos"].copy()
+        # All begin on the ground: the first contact is no impact.
+        self._touched = np.ones((self._release, len(self._last_qpos), feet), dtype=bool)
+        self._stood = np.ones((len(self._last_qpos), feet), dtype=bool)
+        self._restarts: list[tuple[int, NDArray[np.bool_]]] = []
+        self._steps = 0
+        env.on_physics_step = self._record
+
+    def close(self) -> None:
+        """Stop recording."""
+        self._env.on_physics_step = None
+
+    def restart(self, robots: NDArray[np.bool_], unstable: NDArray[np.bool_] | None = None) -> None:
+        """Take note that robots begin anew: a foot's first contact from now on is no impact.
+
+        Args:
+            robots: Those that are reset after the physics so far. Shape: (robots recorded,).
+            unstable: Those whose simulation blew up in the control step just made: in its place
+                they are recorded at rest where they begin anew. Shape: (robots recorded,).
+        """
+        self._restarts.append((len(self._rows["qpos"]), robots.copy()))
+        if unstable is not None and unstable.any():
+            for row in range(-min(self._env.cfg.decimation, len(self._rows["qpos"])), 0):
+                self._lay_at_rest(row, unstable)
+
+    def take(self) -> ContactBlock:
+        """Return what happened since the last call, and forget it.
+
+        Raises:
+            ValueError: If nothing happened.
+        """
+        if not self._rows["qpos"]:
+            raise ValueError("no physics step since the last block")
+        rows = {name: np.stack(values) for name, values in self._rows.items()}
+        for values in self._rows.values():
+            values.clear()
+        start = self._steps * self.timestep
+        steps, robots = rows["qpos"].shape[:2]
+        self._steps += steps
+        sensors = {name: rows["sensordata"][:, :, at] for name, at in self._columns.items()}
+        vectors = {
+            name: sensors[name].reshape(steps, robots, len(LEGS), 3)
+            for name in ("pos", "vel", "force", "angvel")
+        }
+        floor = self._floor(vectors["pos"][..., :2])
+        joint_speed = np.abs(rows["qvel"][:, :, 6:])
+        block = ContactBlock(
+            start=start,
+            timestep=self.timestep,
+            impacts=self._impacts(start, sensors["contact"] > 0.0, vectors, floor, rows["qpos"]),
+            friction_power=_friction_power(vectors),
+            foot_pos=vectors["pos"],
+            floor=floor,
+            joint_power=np.abs(rows["actuator_force"]) * joint_speed,
+            joint_speed=joint_speed,
+            trunk_pos=rows["qpos"][:, :, :3],
+            trunk_quat=rows["qpos"][:, :, 3:7],
+        )
+        self._last_qpos = rows["qpos"][-1]
+        self._restarts.clear()
+        return block
+
+    def _record(self) -> None:
+        for name, live in self._live.items():
+            self._rows[name].append(live.copy())
+
+    def _lay_at_rest(self, row: int, robots: NDArray[np.bool_]) -> None:
+        """Replace what was recorded in a physics step: neither speed, force nor contact."""
+        for name in ("qvel", "actuator_force", "sensordata"):
+            self._rows[name][row][robots] = 0.0
+        qpos = self._live["qpos"][robots]
+        self._rows["qpos"][row][robots] = qpos
+        sensors = self._rows["sensordata"][row][robots]
+        sensors[:, self._columns["pos"]] = np.tile(qpos[:, :3], len(LEGS))
+        self._rows["sensordata"][row][robots] = sensors
+
+    def _floor(self, xy: NDArray[np.floating]) -> NDArray[np.integer]:
+        if callable(self._floor_at):
+            return self._floor_at(xy)
+        return np.full(xy.shape[:-1], self._floor_at, dtype=np.int8)
+
+    def _impacts(
+        self,
+        start: float,
+        contact: NDArray[np.bool_],
+        vectors: dict[str, NDArray],
+        floor: NDArray[np.integer],
+        qpos: NDArray,
+    ) -> Impacts:
+        """Find the onsets of contact and what hits the floor with what.
+
+        The step that first finds contact still carries the velocity of the approach: the contact
+        force acts from the next one on.
+        """
+        known = np.concatenate((self._touched, contact))
+        before = np.lib.stride_tricks.sliding_window_view(known[:-1], self._release, axis=0)
+        onset = contact & ~before.any(axis=-1) & self._have_stood(contact)
+        self._touched = known[len(known) - self._release :]
+        step, robot, foot = np.nonzero(onset)
+        # Sensors lag the positions by a step: those of a step's contacts are the step before's.
+        poses = np.concatenate((self._last_qpos[None], qpos[:-1]))[step, robot]
+        return Impacts(
+            time=start + step * self.timestep,
+            robot=robot,
+            foot=foot,
+            speed=np.maximum(-vectors["vel"][step, robot, foot, 2], 0.0),
+            mass=effective_mass(self._model, self._data, poses, foot),
+            floor=floor[step, robot, foot],
+            position=vectors["pos"][step, robot, foot] - (0.0, 0.0, FOOT_RADIUS),
+        )
+
+    def _have_stood(self, contact: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return whether each foot was in contact before, since its robot began anew.
+
+        Shape: that of `contact`, (steps, robots, 4).
+        """
+        stood = np.empty_like(contact)
+        nobody = np.zeros(contact.shape[1], dtype=bool)
+        first = 0
+        for stop, robots in [*self._restarts, (len(contact), nobody)]:
+            run = np.concatenate((self._stood[None], contact[first:stop]))
+            run = np.logical_or.accumulate(run)
+            stood[first:stop], self._stood = run[:-1], run[-1] & ~robots[:, None]
+            first = stop
+        return stood
+
+
+def effective_mass(
+    model: mujoco.MjModel, data: mujoco.MjData, qpos: NDArray, foot: NDArray[np.integer]
+) -> NDArray[np.float64]:
+    """Return the mass that a vertical blow at a foot meets: (n^T J M^-1 J^T n)^-1, kg.
+
+    J is the Jacobian of the foot's centre, n the floor's normal, M the robot's inertia matrix with
+    the rotors' inertia (`armature`) in it: the joints are free to give way, as they are within the
+    few milliseconds of an impact.
+
+    Args:
+        model: The robot; its masses are not those of a randomised copy.
+        data: Scratch data of it.
+        qpos: Poses. Shape: (n, nq).
+        foot: Index of each pose's foot in the order of `LEGS`. Shape: (n,).
+    """
+    sites = [model.site(f"{leg}_foot").id for leg in LEGS]
+    jacobian, response = np.zeros((3, model.nv)), np.zeros((1, model.nv))
+    result = np.empty(len(foot))
+    for index, (pose, leg) in enumerate(zip(qpos, foot, strict=True)):
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_crb(model, data)
+        mujoco.mj_factorM(model, data)
+        mujoco.mj_jacSite(model, data, jacobian, None, sites[leg])
+        mujoco.mj_solveM(model, data, response, jacobian[2:3])
+        result[index] = 1.0 / (jacobian[2] @ response[0])
+    return result
+
+
+def _friction_power(vectors: dict[str, NDArray]) -> NDArray[np.floating]:
+    """Return the power that each foot loses to the floor by sliding, W. Shape: (steps, robots, 4).
+
+    It is taken where the foot touches: a foot that rolls does not slide, though its centre moves.
+    The force is the foot's on the floor.
+    """
+    x, y = vectors["vel"][..., 0], vectors["vel"][..., 1]
+    turn_x, turn_y = vectors["angvel"][..., 0], vectors["angvel"][..., 1]
+    # v + w x (0, 0, -r)
+    slide_x, slide_y = x - turn_y * FOOT_RADIUS, y + turn_x * FOOT_RADIUS
+    force = vectors["force"]
+    power = np.maximum(force[..., 0] * slide_x + force[..., 1] * slide_y, 0.0)
+    return np.where(np.hypot(slide_x, slide_y) > _CREEP, power, 0.0)

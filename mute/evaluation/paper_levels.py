@@ -1,0 +1,13 @@
+"""Noise levels that the paper measured on the real robot at 0.5 m/s (its table of noise levels)."""
+
+from __future__ import annotations
+
+__all__ = ["PAPER_LEVELS"]
+
+PAPER_LEVELS: dict[str, dict[str, tuple[float, float]]] = {
+    "dreamwaq": {"wood": (73.51, 83.18), "carpet": (71.90, 80.80), "tile": (72.34, 80.93)},
+    "mpc": {"wood": (79.74, 84.03), "carpet": (77.92, 81.25), "tile": (79.38, 83.12)},
+    "mute beta 0": {"wood": (68.61, 75.86), "carpet": (67.42, 74.40), "tile": (70.69, 79.30)},
+    "mute beta 1": {"wood": (65.78, 73.18), "carpet": (62.48, 69.52), "tile": (66.15, 76.22)},
+}
+"""(MNL, PNL) in dBA by method and floor."""

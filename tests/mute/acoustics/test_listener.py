@@ -1,0 +1,172 @@
+"""Tests of the listener: what counts for the levels, and files that are whole."""
+
+from __future__ import annotations
+
+import math
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from mute.acoustics import listener as listener_module
+from mute.acoustics.gains import load_gains
+from mute.acoustics.listener import SAMPLE_RATE, HeardLevels, Listener, WavFile
+from mute.acoustics.wav import read_wav
+from mute.command_lines.arguments import REPOSITORY
+from mute.controllers import LearnedController, load_policy
+from mute.errors import MuteError
+from mute.evaluation.listening import listening_cfg, make_listening_env
+from mute.evaluation.trials import evaluation_cfg, run_trial
+
+SETTLE = 0.5
+
+
+def _make_env(num_envs: int = 2) -> QuadrupedEnv:
+    still = QuadrupedEnvCfg(num_threads=1, initial_joint_noise=0.0, initial_velocity=0.0)
+    cfg = evaluation_cfg(still, num_envs, seconds=60.0, seed=0)
+    return QuadrupedEnv(listening_cfg(cfg, "tile"))
+
+
+def _stamp(env: QuadrupedEnv, step: int) -> torch.Tensor:
+    """Lift and drop a diagonal pair of legs, twice a second."""
+    beat, within = divmod(step, 25)
+    actions = torch.zeros(env.num_envs, 4, 3)
+    if within < 10:
+        actions[:, [beat % 2, 3 - beat % 2], 2] = -1.0
+    return actions.flatten(1)
+
+
+def _walk(env: QuadrupedEnv, listener: Listener, steps: int, upset: int | None = None) -> None:
+    """Stamp; at a step, turn the second robot on its back, whereupon it is reset."""
+    for step in range(steps):
+        if step == upset:
+            env.simulation.qpos[1, 3:7] = torch.tensor([0.0, 1.0, 0.0, 0.0])
+            env.simulation.qpos[1, 2] += 0.5
+        _, _, dones, _ = env.step(_stamp(env, step))
+        assert dones.tolist() == [False, step == upset]
+        listener.listen(dones)
+
+
+def _policy_trial(upset: int | None, from_energies: bool) -> tuple[HeardLevels, float]:
+    """Return the levels of a robot that may be upset in mid-trial, and its loudest reading."""
+    policy = load_policy(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
+    env = make_listening_env(evaluation_cfg(policy.cfg.env, 1, 20.0, seed=1), "tile")
+    listener = Listener(env, ["tile"], gains=load_gains(), from_energies=from_energies)
+    steps = count()
+
+    def hear(_: object, dones: torch.Tensor) -> None:
+        listener.listen(dones)
+        step = next(steps)
+        if step == upset:
+            env.simulation.qpos[0, 3:7] = torch.tensor([0.0, 1.0, 0.0, 0.0])
+        elif upset is not None and step == upset + 10:
+            env.simulation.qpos[0, 2] += 0.2  # it stumbles as it gets going again
+
+    command = torch.tensor((0.5, 0.0, 0.0, 0.0))
+    with listener:
+        meter = run_trial(env, LearnedController(policy, 1), command, 400, hear)
+    assert meter.gait().fall_rate == (0.0 if upset is None else 1.0)
+    return listener.levels()[0], float(listener._all_readings().max())
+
+
+@pytest.mark.parametrize("from_energies", [False, True])
+def test_a_robot_upset_in_mid_trial_has_the_peak_of_one_that_is_not(from_energies):
+    calm, _ = _policy_trial(None, from_energies)
+    fallen, loudest = _policy_trial(150, from_energies)
+    assert loudest > calm.pnl + 3.0
+    assert fallen.pnl == pytest.approx(calm.pnl, abs=1.0)
+    assert fallen.mnl == pytest.approx(calm.mnl, abs=1.0)
+    assert fallen.laeq == pytest.approx(calm.laeq, abs=1.0)
+
+
+def test_a_reading_counts_once_robot_and_detector_have_settled_after_start_and_fall():
+    env = _make_env()
+    listener = Listener(env, ["tile"], settle_time=SETTLE, from_energies=True)
+    with listener:
+        _walk(env, listener, 150, upset=75)  # a fall within the step from 1.50 s to 1.52 s
+    kept = ~np.isnan(listener.readings())
+    times = listener.reading_times()
+    assert times[kept[0]] == pytest.approx(np.arange(20, 61) / 20)
+    before, after = times[kept[1]][:11], times[kept[1]][11:]
+    assert before == pytest.approx(np.arange(20, 31) / 20)
+    assert after == pytest.approx(np.arange(51, 61) / 20)
+
+
+def test_the_equivalent_level_leaves_out_what_does_not_count():
+    env = _make_env()
+    listener = Listener(env, ["tile"], settle_time=SETTLE, sources=("fan",), from_energies=True)
+    with listener:
+        _walk(env, listener, 120, upset=60)
+    assert [levels.laeq for levels in listener.levels()] == pytest.approx([55.0, 55.0], abs=0.2)
+    assert listener._tally[1] == pytest.approx([2.4 - SETTLE, 2.4 - 2 * SETTLE - 0.02])
+
+
+def test_a_simulation_that_blows_up_is_not_heard(tmp_path):
+    env, path = _make_env(), tmp_path / "walk.wav"
+    listener = Listener(env, ["tile"], settle_time=SETTLE, wav={1: path})
+    with listener:
+        for step in range(150):
+            if step == 75:
+                env.simulation.qvel[1, 8] = math.nan
+            _, _, dones, _ = env.step(_stamp(env, step) * 0.0)
+            listener.listen(dones)
+    assert env.unstable_count == 1
+    assert all(levels.pnl < 58.0 for levels in listener.levels())
+    assert np.isfinite(listener.levels()[1].laeq)
+    begin = round((1.5 - SETTLE) * SAMPLE_RATE)
+    assert np.abs(read_wav(path)[0][0, begin : begin + 960]).max() < 0.01
+
+
+def test_a_file_begins_once_the_robot_has_settled(tmp_path):
+    env, path = _make_env(), tmp_path / "walk.wav"
+    listener = Listener(env, ["tile"], settle_time=SETTLE, wav=path)
+    with listener:
+        _walk(env, listener, 60)
+    assert read_wav(path)[0].shape == (1, round((1.2 - SETTLE) * SAMPLE_RATE))
+    assert listener.clipped == {path: 0}
+
+
+def test_a_file_is_whole_however_the_walk_ends(tmp_path):
+    env, path = _make_env(), tmp_path / "walk.wav"
+    listener = Listener(env, ["tile"], settle_time=0.0, wav=path, stretch=0.2)
+    with pytest.raises(KeyboardInterrupt), listener:
+        _walk(env, listener, 35)
+        raise KeyboardInterrupt
+    assert read_wav(path)[0].shape == (1, round(0.6 * SAMPLE_RATE))
+
+
+def test_one_file_that_cannot_be_opened_leaves_the_others_closed(tmp_path):
+    env, path = _make_env(), tmp_path / "walk.wav"
+    listener = Listener(env, ["tile"], wav={0: path, 1: tmp_path})
+    with pytest.raises(MuteError, match="Is a directory"), listener:
+        pass
+    assert listener.clipped == {path: 0}
+
+
+def test_samples_beyond_full_scale_are_cut_off_and_counted(tmp_path):
+    file = WavFile(tmp_path / "loud.wav")
+    file.write(np.array([0.0, 2.0, 5.0, -5.0]))
+    file.close()
+    assert file.clipped == 2
+    samples = read_wav(file.path)[0][0]
+    assert samples == pytest.approx([0.0, 0.5, 1.0, -1.0], abs=1e-4)
+
+
+def test_a_file_ends_at_its_greatest_length(tmp_path, monkeypatch):
+    monkeypatch.setattr(listener_module, "_LONGEST_FILE", 5)
+    file = WavFile(tmp_path / "long.wav")
+    for _ in range(3):
+        file.write(np.zeros(3))
+    file.close()
+    assert read_wav(file.path)[0].shape == (1, 5)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
+def test_a_full_disk_is_told_in_one_line():
+    file = WavFile(Path("/dev/full"))
+    with pytest.raises(MuteError, match="cannot write /dev/full: No space left on device"):
+        file.write(np.zeros(100_000))
+        file.close()

@@ -1,0 +1,140 @@
+"""All sources together, streamed."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from sound_helpers import FLOORS, make_block, random_walk
+
+from mute.acoustics.soundscape import SOURCES, Soundscape
+
+
+def _in_parts(block, length, sample_rate=48000, **options):
+    sound = Soundscape(block.num_robots, FLOORS, sample_rate=sample_rate, **options)
+    starts = range(0, block.steps, length)
+    return np.concatenate([sound.render(block.part(k, k + length)) for k in starts], axis=1)
+
+
+@pytest.mark.parametrize("length", [1, 7, 20, 501])
+@pytest.mark.parametrize("sample_rate", [48000, 44100])
+def test_streamed_equals_whole(length, sample_rate):
+    block = random_walk(seconds=0.65, robots=2, seed=3)
+    block.floor = (np.arange(block.steps) // 170)[:, None, None] % 4 + np.zeros((1, 2, 4), int)
+    block.impacts.floor = block.floor[block.impact_steps(), 0, 0]
+    whole = Soundscape(2, FLOORS, sample_rate=sample_rate).render(block)
+    parts = _in_parts(block, length, sample_rate)
+    assert parts.shape == whole.shape == (2, round(0.65 * sample_rate))
+    np.testing.assert_allclose(parts, whole, rtol=0.0, atol=1e-6 * np.abs(whole).max())
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_every_source_streams(source):
+    block = random_walk(seconds=0.4, robots=2, seed=4)
+    whole = Soundscape(2, FLOORS, sources=(source,)).render(block)
+    assert whole.any(axis=1).all()
+    parts = _in_parts(block, 37, sources=(source,))
+    np.testing.assert_allclose(parts, whole, rtol=0.0, atol=1e-6 * np.abs(whole).max())
+
+
+def test_the_mix_is_the_sum_of_the_sources_alone():
+    block = random_walk(seconds=0.5, seed=5)
+    mix = Soundscape(1, FLOORS).render(block)
+    alone = [Soundscape(1, FLOORS, sources=(name,)).render(block) for name in SOURCES]
+    np.testing.assert_allclose(mix, np.sum(alone, axis=0), atol=1e-6)
+
+
+def test_equal_seeds_give_equal_sound_and_others_do_not():
+    block = random_walk(seconds=0.2, robots=2)
+    first, again, other = (Soundscape(2, FLOORS, seed=s).render(block) for s in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert not np.allclose(first, other, atol=1e-3)
+
+
+def test_robots_do_not_share_their_noise():
+    pressure = Soundscape(2, FLOORS, sources=("fan",)).render(make_block(2000, robots=2))
+    assert abs(np.corrcoef(pressure[0], pressure[1]).item(1)) < 0.05
+
+
+def test_a_pulse_that_reaches_over_the_end_of_a_block_goes_on_in_the_next():
+    block = make_block(100, landings=[(49, 0, 0, 0.4, 1.5)])
+    sound = Soundscape(1, FLOORS, sources=("impacts",))
+    first, second = sound.render(block.part(0, 50)), sound.render(block.part(50, 100))
+    assert not first.any()  # it is still on its way
+    assert second.any()
+
+
+def test_blocks_of_samples_tile_time_at_odd_rates():
+    block = make_block(1000)
+    sound = Soundscape(1, FLOORS, sample_rate=22050, sources=("fan",))
+    starts = range(0, 1000, 3)
+    counts = [sound.render(block.part(first, first + 3)).shape[1] for first in starts]
+    assert sum(counts) == 22050
+    assert set(counts) == {66, 67, 22}  # 66.15 in 3 ms, 22.05 in the last block of 1 ms
+
+
+def test_pressure_is_float32_and_has_a_row_for_each_robot():
+    pressure = Soundscape(3, FLOORS).render(make_block(10, robots=3))
+    assert pressure.dtype == np.float32
+    assert pressure.shape == (3, 480)
+
+
+def test_a_block_that_leaves_a_gap_is_refused():
+    block = make_block(100)
+    sound = Soundscape(1, FLOORS)
+    sound.render(block.part(0, 50))
+    with pytest.raises(ValueError, match=r"block starts at 0\.06 s, not at 0\.05 s"):
+        sound.render(block.part(60, 100))
+
+
+def test_a_block_of_another_number_of_robots_is_refused():
+    with pytest.raises(ValueError, match="block has 2 robots, not 1"):
+        Soundscape(1, FLOORS).render(make_block(10, robots=2))
+
+
+def test_an_unknown_floor_is_refused():
+    with pytest.raises(ValueError, match="'moss' is not known"):
+        Soundscape(1, ("moss",))
+
+
+def test_an_unknown_source_is_refused():
+    with pytest.raises(ValueError, match="'barking' is not known"):
+        Soundscape(1, FLOORS, sources=("barking",))
+
+
+@pytest.mark.parametrize("gain", [0.0, -1.0, float("nan")])
+def test_a_gain_that_is_no_gain_is_refused(gain):
+    with pytest.raises(ValueError, match="gains must be finite and positive"):
+        Soundscape(1, FLOORS, gains={"wood": gain})
+
+
+def test_a_silent_soundscape_is_refused():
+    with pytest.raises(ValueError, match="sources must not be empty"):
+        Soundscape(1, FLOORS, sources=())
+
+
+def test_parts_of_a_block_hold_each_impact_once():
+    block = random_walk(seconds=0.5, landings_per_second=100)
+    parts = [block.part(k, k + 30) for k in range(0, block.steps, 30)]
+    times = np.concatenate([part.impacts.time for part in parts])
+    np.testing.assert_array_equal(times, block.impacts.time)
+    for part in parts:
+        assert (part.impacts.time > part.start - 1e-9).all()
+        assert (part.impacts.time < part.end - 1e-9).all()
+
+
+def test_an_impact_between_two_steps_belongs_to_the_one_that_it_is_in():
+    block = make_block(10, landings=[(3, 0, 0, 0.4, 1.5), (6, 0, 1, 0.4, 1.5)])
+    block.impacts.time = np.array([0.0039, 0.006 - 1e-12])
+    np.testing.assert_array_equal(block.impact_steps(), [3, 6])
+
+
+def test_sound_does_not_depend_on_the_precision_of_physics():
+    block = random_walk(seconds=0.2, seed=6)
+    floats = {
+        field.name: value.astype(np.float32)
+        for field in dataclasses.fields(block)
+        if isinstance(value := getattr(block, field.name), np.ndarray) and value.dtype == float
+    }
+    single = dataclasses.replace(block, **floats)
+    double, float32 = (Soundscape(1, FLOORS).render(each) for each in (block, single))
+    np.testing.assert_allclose(float32, double, atol=1e-5)
