@@ -1,4 +1,4 @@
-"""Print the card of a policy, and a benchmark, as the README's tables: python -m mute.card."""
+"""Print a policy's card, its noise and a benchmark as Markdown tables: python -m mute.card."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 from mute.command_lines.arguments import REPOSITORY, command_line, parse
 from mute.errors import MuteError, run_cli
+from mute.evaluation.paper_levels import PAPER_LEVELS
 from mute.evaluation.tables import read_json
 from mute.tasks import DEFAULT_TASK
 
@@ -31,6 +32,19 @@ _AT_SPEED = {
     "stride_frequency": ("strides/s a foot", "{:.2f}"),
     "power": ("power (W)", "{:.1f}"),
 }
+_NOISE = {
+    "surface": ("floor", "{}"),
+    "beta": ("beta", "{:g}"),
+    "mnl": ("MNL (dBA)", "{}"),
+    "pnl": ("PNL (dBA)", "{}"),
+    "paper": ("paper, real robot: MNL, PNL", "{}"),
+    "speed_mean": ("actual speed (m/s)", "{:.2f}"),
+    "velocity_error_sq": ("velocity error (m/s)^2", "{:.3f}"),
+    "landing_speed_rms": ("landing speed, RMS (m/s)", "{:.3f}"),
+    "apex_cm": ("apex (cm)", "{:.1f}"),
+    "stride_frequency": ("strides/s a foot", "{:.2f}"),
+    "cost_of_transport": ("cost of transport", "{:.2f}"),
+}
 _RATES = {
     "num_envs": ("environments", "{:d}"),
     "engine": ("engine alone", "{:,.0f}"),
@@ -49,6 +63,8 @@ class CardArgs:
 
     card: Path = REPOSITORY / "resources" / "go1" / f"{DEFAULT_TASK}.json"
     """Card that `mute.release` wrote."""
+    noise: Path = REPOSITORY / "docs" / "noise" / "noise.json"
+    """File that `evaluate.py noise` wrote."""
     benchmark: Path = REPOSITORY / "docs" / "benchmark.json"
     """File that `mute.benchmark --out` wrote."""
 
@@ -60,8 +76,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         MuteError: If a file is missing.
     """
     argv = command_line() if argv is None else list(argv)
-    args = parse(CardArgs, argv, "Print a policy's card and a benchmark as Markdown.")
-    for path in (args.card, args.benchmark):
+    args = parse(CardArgs, argv, "Print a policy's card, its noise and a benchmark as Markdown.")
+    for path in (args.card, args.noise, args.benchmark):
         if not path.is_file():
             raise MuteError(f"no file at {path}")
     card, benchmark = read_json(args.card), read_json(args.benchmark)
@@ -76,6 +92,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     print(f"\nAt an actual forward speed of {figures['speed']:g} m/s:\n")
     in_cm = [row | {"apex_mean": _times(row["apex_mean"], 100.0)} for row in figures["at_speed"]]
     print(markdown(in_cm, _AT_SPEED))
+    noise = read_json(args.noise)
+    print(
+        f"\nModelled noise at the trunk, {noise[0]['command_speed']:g} m/s commanded, "
+        f"{noise[0]['trials']} trials:\n"
+    )
+    print(markdown([_noise_row(row) for row in noise], _NOISE))
     print(f"\nControl steps/s of `{benchmark['task']}` on {benchmark['machine']}:\n")
     print(markdown(benchmark["rates"], _RATES))
     return 0
@@ -97,6 +119,18 @@ def markdown(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, tuple[str,
         ]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
+
+
+def _noise_row(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a row of `evaluate.py noise` with its spreads, and the paper's levels, in words."""
+    measured = PAPER_LEVELS.get(f"mute beta {row['beta']:g}", {}).get(row["surface"])
+    return {
+        **row,
+        "mnl": f"{row['mnl_mean']:.1f} +- {row['mnl_std']:.1f}",
+        "pnl": f"{row['pnl_mean']:.1f} +- {row['pnl_std']:.1f}",
+        "paper": None if measured is None else f"{measured[0]:.1f}, {measured[1]:.1f}",
+        "apex_cm": _times(row["apex_mean"], 100.0),
+    }
 
 
 def _times(value: float | None, factor: float) -> float | None:

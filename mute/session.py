@@ -13,6 +13,7 @@ import torch
 from envs.quadruped_env import QuadrupedEnv
 from mute.controllers import Controller
 from mute.evaluation.gait import Gait, GaitMeter
+from mute.hearing import Ear
 
 __all__ = ["COMMAND_LIMITS", "Command", "Session"]
 
@@ -56,6 +57,7 @@ class Session:
         controller: Controller,
         command: Command,
         settle_time: float = 1.0,
+        ear: Ear | None = None,
     ) -> None:
         """Begin an episode of all robots.
 
@@ -64,9 +66,11 @@ class Session:
             controller: What drives them.
             command: What they are asked to do at first.
             settle_time: Time after the start of an episode that the summary leaves out, s.
+            ear: Hears every step; it is entered and left by whoever walks.
         """
         self.env = env
         self.controller = controller
+        self.ear = ear
         self._command = command
         self._settle_time = settle_time
         self.restart()
@@ -88,6 +92,8 @@ class Session:
 
     def restart(self) -> None:
         """Begin anew: robots, figures and time."""
+        if self.ear is not None:
+            self.ear.restart()
         self.env.reset()
         self.env.set_command(self._command.tensor())
         self.controller.reset()
@@ -102,6 +108,8 @@ class Session:
         command = env.commands.command.clone()
         _, _, dones, _ = env.step(self.controller.act(env.get_observations()))
         self.steps += 1
+        if self.ear is not None:
+            self.ear.listen()
         for meter in (self._meter, self._recent):
             meter.update(command, dones)
         if bool(dones.any()):

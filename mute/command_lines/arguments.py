@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
+import os
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -15,10 +17,52 @@ import tyro
 
 from mute.errors import MuteError
 
-__all__ = ["REPOSITORY", "parse", "resolve_device", "selected_task"]
+__all__ = [
+    "REPOSITORY",
+    "Numbers",
+    "Words",
+    "check_betas",
+    "check_distinct",
+    "check_seed",
+    "check_trials",
+    "check_wav",
+    "make_directory",
+    "parse",
+    "resolve_device",
+    "selected_task",
+]
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 """Root of the repository, where the resources are."""
+
+
+def _split(words: Sequence[str]) -> list[str]:
+    return [part for word in words for part in word.split(",") if part]
+
+
+Numbers = Annotated[
+    tuple[float, ...],
+    tyro.constructors.PrimitiveConstructorSpec(
+        nargs="*",
+        metavar="X[,X...]",
+        instance_from_str=lambda words: tuple(float(part) for part in _split(words)),
+        is_instance=lambda value: isinstance(value, tuple),
+        str_from_instance=lambda value: [",".join(f"{number:g}" for number in value)],
+    ),
+]
+"""Numbers, separated by commas or blanks."""
+
+Words = Annotated[
+    tuple[str, ...],
+    tyro.constructors.PrimitiveConstructorSpec(
+        nargs="*",
+        metavar="NAME[,NAME...]",
+        instance_from_str=lambda words: tuple(_split(words)),
+        is_instance=lambda value: isinstance(value, tuple),
+        str_from_instance=lambda value: [",".join(value)],
+    ),
+]
+"""Names, separated by commas or blanks."""
 
 _Args = TypeVar("_Args")
 _Result = TypeVar("_Result")
@@ -77,6 +121,80 @@ def resolve_device(device: str) -> str:
     if device == "cuda" and not torch.cuda.is_available():
         raise MuteError("--device cuda: torch sees no CUDA device here, use --device cpu")
     return device
+
+
+def check_trials(trials: int, seconds: float) -> None:
+    """Check --trials and --seconds.
+
+    Raises:
+        MuteError: If there are none, or they are too short to measure.
+    """
+    if trials < 1:
+        raise MuteError(f"--trials must be >= 1, got {trials}")
+    if not 1.0 < seconds < math.inf:
+        raise MuteError(f"--seconds must be > 1, got {seconds:g}")
+
+
+def check_betas(betas: Sequence[float]) -> None:
+    """Check --beta.
+
+    Raises:
+        MuteError: If there is none, or one is out of its range.
+    """
+    if not betas or any(not 0.0 <= beta <= 1.0 for beta in betas):
+        given = " ".join(map(str, betas)) or "none"
+        raise MuteError(f"--beta must be numbers in [0, 1], got {given}")
+
+
+def check_distinct(option: str, values: Sequence[object]) -> None:
+    """Check that an option with a list has something in it, each once.
+
+    Args:
+        option: Its name, without the dashes.
+        values: What was given.
+
+    Raises:
+        MuteError: If it is empty or repeats itself.
+    """
+    if not values:
+        raise MuteError(f"--{option} must name at least one, got none")
+    repeated = next((value for value in values if values.count(value) > 1), None)
+    if repeated is not None:
+        raise MuteError(f"--{option} must name each but once, got {repeated} again")
+
+
+def check_seed(seed: int) -> None:
+    """Check --seed.
+
+    Raises:
+        MuteError: If it is negative or takes more than 31 bits.
+    """
+    if not 0 <= seed < 2**31:
+        raise MuteError(f"--seed must be at least 0 and at most {2**31 - 1}, got {seed}")
+
+
+def check_wav(path: Path | None) -> None:
+    """Check --wav.
+
+    Raises:
+        MuteError: If it names a file of another kind.
+    """
+    if path is not None and path.suffix.lower() != ".wav":
+        raise MuteError(f"--wav must name a .wav file, got {str(path)!r}")
+
+
+def make_directory(path: Path) -> None:
+    """Make the directory of --out, before any work whose figures could not be kept.
+
+    Raises:
+        MuteError: If it cannot be made or written to.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MuteError(f"--out {path}: cannot be made a directory: {error.strerror}") from error
+    if not os.access(path, os.W_OK):
+        raise MuteError(f"--out {path}: cannot be written to")
 
 
 def command_line() -> list[str]:

@@ -2,73 +2,32 @@
 
 from __future__ import annotations
 
-import dataclasses
-import os
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable, Sequence
 from typing import Any
 
-import torch
-from rich.progress import track
-
-from envs.commands import BETA, CommandSampler
-from envs.quadruped_env import QuadrupedEnv
-from mute.command_lines.arguments import REPOSITORY, command_line, parse
-from mute.controllers import LearnedController, load_policy
-from mute.controllers.learned import Policy
+from mute.command_lines.arguments import command_line, parse
+from mute.command_lines.evaluate_gait import GaitArgs, ProgressArgs, gait, progress
+from mute.command_lines.evaluate_noise import (
+    NoiseArgs,
+    SweepBetaArgs,
+    SweepSpeedArgs,
+    noise,
+    sweep_beta,
+    sweep_speed,
+)
+from mute.command_lines.walk import WalkArgs, walk
 from mute.errors import MuteError
-from mute.evaluation.estimation_errors import EstimationMeter
-from mute.evaluation.matched_speed import sweep_beta_at_speed
-from mute.evaluation.progress import Milestone, checkpoints_of, training_minutes, walks
-from mute.evaluation.tables import print_table, write_csv, write_json
-from mute.evaluation.trials import evaluation_cfg, run_trial
-from mute.provenance import machine_kind
-from mute.tasks import DEFAULT_TASK
 
 __all__ = ["main"]
 
-_SWEEP_ROBOTS = 300
-
-
-@dataclass
-class GaitArgs:
-    """Walk over the command range, and at one actual speed for several betas."""
-
-    policy: Path = REPOSITORY / "resources" / "go1" / f"{DEFAULT_TASK}.pt"
-    """Policy to measure."""
-    trials: int = 256
-    """Robots that walk over the command range, for each beta."""
-    seconds: float = 20.0
-    """Length of a trial, s."""
-    beta: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
-    """Quiet factors."""
-    speed: float = 0.5
-    """Actual forward speed at which the betas are compared, m/s."""
-    randomized: bool = False
-    """Keep the training's randomised physics, pushes and sensor noise."""
-    seed: int = 1
-    """Seed of initial states and commands."""
-    out: Path = Path("evaluation")
-    """Directory of the CSV and JSON files."""
-
-
-@dataclass
-class ProgressArgs:
-    """Measure a run's checkpoints over the command range until one walks."""
-
-    run: Path
-    """Directory of the run."""
-    trials: int = 256
-    """Robots that walk, each with its own command and beta."""
-    seconds: float = 20.0
-    """Length of a trial, s."""
-    randomized: bool = False
-    """Keep the training's randomised physics, pushes and sensor noise."""
-    seed: int = 1
-    """Seed of initial states and commands."""
-    out: Path = Path("evaluation")
-    """Directory of the CSV and JSON files."""
+_COMMANDS: dict[str, tuple[type, Callable[[Any], None], str]] = {
+    "gait": (GaitArgs, gait, "walk over the command range, and at one actual speed"),
+    "progress": (ProgressArgs, progress, "measure a run's checkpoints until one walks"),
+    "noise": (NoiseArgs, noise, "modelled noise levels on several floors"),
+    "sweep-speed": (SweepSpeedArgs, sweep_speed, "modelled noise levels against the actual speed"),
+    "sweep-beta": (SweepBetaArgs, sweep_beta, "modelled noise levels against the quiet factor"),
+    "walk": (WalkArgs, walk, "a long walk over mixed floors, with a map of the levels"),
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -79,125 +38,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     argv = command_line() if argv is None else list(argv)
     if argv[:1] in (["-h"], ["--help"]):
-        print(_USAGE)
+        print(_usage())
         return 0
-    if argv[:1] == ["gait"]:
-        _gait(parse(GaitArgs, argv[1:], GaitArgs.__doc__ or ""))
-    elif argv[:1] == ["progress"]:
-        _progress(parse(ProgressArgs, argv[1:], ProgressArgs.__doc__ or ""))
-    else:
+    if not argv or argv[0] not in _COMMANDS:
         given = argv[0] if argv else "nothing"
-        raise MuteError(f"the first argument must be gait or progress, got {given}")
+        raise MuteError(f"the first argument must be one of {', '.join(_COMMANDS)}, got {given}")
+    args_type, run, _ = _COMMANDS[argv[0]]
+    run(parse(args_type, argv[1:], args_type.__doc__ or ""))
     return 0
 
 
-_USAGE = """usage: evaluate.py {gait,progress} [options]
-
-gait       walk over the command range, and at one actual speed for several betas
-progress   measure a run's checkpoints until one walks
-
-`evaluate.py gait --help` lists the options of gait, and so on."""
-
-
-def _progress(args: ProgressArgs) -> None:
-    _check_trials(args.trials, args.seconds)
-    torch.set_num_threads(1)  # the physics engine has the cores
-    rows: list[dict[str, Any]] = []
-    for path in track(checkpoints_of(args.run), "checkpoints"):
-        policy, minutes = load_policy(path), training_minutes(path)
-        env = _environment(policy, args.trials, args.seconds, args.seed, args.randomized)
-        draw = _draw_commands(env, args.seed)
-        steps = round(args.seconds / env.step_dt)
-        gait = run_trial(env, LearnedController(policy, env.num_envs), draw.command, steps).gait()
-        error, falls = gait.velocity_error_sq, gait.fall_rate
-        milestone = Milestone(policy.iteration, minutes, error, falls, walks(error, falls))
-        rows.append(dataclasses.asdict(milestone))
-        if milestone.walks:
-            break
-    print_table(f"{args.trials} trials of {args.seconds:g} s", rows, list(rows[0]))
-    write_csv(args.out / "progress.csv", rows)
-    summary = {"machine": machine_kind(), "trials": args.trials, "checkpoints": rows}
-    write_json(args.out / "progress.json", summary)
-    print(f"written: {args.out}/progress.json, progress.csv")
-
-
-def _gait(args: GaitArgs) -> None:
-    _check(args)
-    torch.set_num_threads(1)  # the physics engine has the cores
-    policy = load_policy(args.policy)
-    over_range = [_over_range(args, policy, beta) for beta in track(args.beta, "command range")]
-    at_speed = _at_speed(args, policy)
-    columns = ["beta", "fall_rate", "velocity_error_sq", "yaw_rate_error_sq"]
-    columns += ["landing_speed_mean", "apex_mean", "power"]
-    columns += ["velocity_rmse", "height_rmse", "phase_mae"]
-    print_table(f"{args.trials} trials of {args.seconds:g} s over the range", over_range, columns)
-    columns = ["beta", "landing_speed_mean", "landing_speed_rms", "apex_mean", "duty_factor"]
-    columns += ["stride_frequency", "power"]
-    print_table(f"at an actual speed of {args.speed:g} m/s", at_speed, columns)
-    write_csv(args.out / "gait_range.csv", over_range)
-    write_csv(args.out / "gait_at_speed.csv", at_speed)
-    summary = {
-        "policy": os.path.relpath(args.policy, REPOSITORY),
-        "iteration": policy.iteration,
-        "trials": args.trials,
-        "seconds": args.seconds,
-        "speed": args.speed,
-        "randomized": args.randomized,
-        "seed": args.seed,
-        "machine": machine_kind(),
-        "range": over_range,
-        "at_speed": at_speed,
-    }
-    write_json(args.out / "gait.json", summary)
-    print(f"written: {args.out}/gait.json, gait_range.csv, gait_at_speed.csv")
-
-
-def _over_range(args: GaitArgs, policy: Policy, beta: float) -> dict[str, Any]:
-    """Return the figures of one beta over the task's whole command range."""
-    env = _environment(policy, args.trials, args.seconds, args.seed, args.randomized)
-    draw = _draw_commands(env, args.seed)
-    draw.command[:, BETA] = beta
-    controller = LearnedController(policy, env.num_envs)
-    estimation = EstimationMeter(env, controller)
-    steps = round(args.seconds / env.step_dt)
-    meter = run_trial(env, controller, draw.command, steps, estimation)
-    return {"beta": beta} | meter.gait().as_dict() | estimation.errors().as_dict()
-
-
-def _at_speed(args: GaitArgs, policy: Policy) -> list[dict[str, float]]:
-    robots = max(_SWEEP_ROBOTS, 12 * len(args.beta))
-    env = _environment(policy, robots, args.seconds, args.seed, args.randomized)
-    # All walk straight ahead, from the stance: only speed and beta differ.
-    controller = LearnedController(policy, robots)
-    steps = round(args.seconds / env.step_dt)
-    return sweep_beta_at_speed(env, controller, args.speed, args.beta, steps)
-
-
-def _environment(
-    policy: Policy, num_envs: int, seconds: float, seed: int, randomized: bool
-) -> QuadrupedEnv:
-    cfg = evaluation_cfg(policy.cfg.env, num_envs, seconds, seed, randomized)
-    return QuadrupedEnv(dataclasses.replace(cfg, num_threads=0))
-
-
-def _draw_commands(env: QuadrupedEnv, seed: int) -> CommandSampler:
-    """Return commands drawn from the task's whole range, beta included."""
-    generator = torch.Generator().manual_seed(seed)
-    draw = CommandSampler(env.cfg.commands, env.num_envs, generator, torch.device("cpu"))
-    draw.resample(torch.ones(env.num_envs, dtype=torch.bool), with_beta=True)
-    return draw
-
-
-def _check_trials(trials: int, seconds: float) -> None:
-    if trials < 1:
-        raise MuteError(f"--trials must be >= 1, got {trials}")
-    if not seconds > 1.0:
-        raise MuteError(f"--seconds must be > 1, got {seconds:g}")
-
-
-def _check(args: GaitArgs) -> None:
-    _check_trials(args.trials, args.seconds)
-    if not args.beta or any(not 0.0 <= beta <= 1.0 for beta in args.beta):
-        raise MuteError(f"--beta must be numbers in [0, 1], got {' '.join(map(str, args.beta))}")
-    if not 0.0 < args.speed <= 1.0:
-        raise MuteError(f"--speed must be in (0, 1], got {args.speed:g}")
+def _usage() -> str:
+    lines = [f"usage: evaluate.py {{{','.join(_COMMANDS)}}} [options]", ""]
+    lines += [f"{name:13}{text}" for name, (_, _, text) in _COMMANDS.items()]
+    lines += ["", "`evaluate.py gait --help` lists the options of gait, and so on."]
+    return "\n".join(lines)

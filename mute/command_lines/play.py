@@ -1,4 +1,4 @@
-"""`play.py`: watch a policy walk, steer it, film it, or have its figures."""
+"""`play.py`: watch a policy walk, hear it, steer it, film it, or have its figures."""
 
 from __future__ import annotations
 
@@ -11,20 +11,29 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from envs.quadruped_env import QuadrupedEnv
 from envs.scene import Look, SceneError
+from mute.acoustics.floors import FLOORS
+from mute.acoustics.gains import load_gains
 from mute.checkpoint import latest_checkpoint
-from mute.command_lines.arguments import REPOSITORY, command_line, parse
+from mute.command_lines.arguments import (
+    REPOSITORY,
+    check_seed,
+    check_wav,
+    command_line,
+    parse,
+)
+from mute.command_lines.play_figures import live_captions, report, summary
 from mute.controllers import LearnedController, load_policy
 from mute.controllers.learned import Policy
 from mute.errors import EXIT_INTERRUPTED, MuteError
-from mute.evaluation.gait import Gait
 from mute.evaluation.trials import evaluation_cfg
+from mute.hearing import Ear, audible_cfg
 from mute.rendering.backend import has_display, why_no_window
 from mute.rendering.keys import KEYS_HELP
 from mute.rendering.video import Video
@@ -32,33 +41,22 @@ from mute.session import COMMAND_LIMITS, Command, Session
 from mute.tasks import DEFAULT_TASK, make_task
 from mute.threads import use_collection_threads
 
-__all__ = ["PlayArgs", "captions", "main", "report"]
+__all__ = ["PlayArgs", "main"]
 
 _DEFAULT_SECONDS = 20.0
 _MAX_SECONDS = 86400.0
 _MAX_ENVS = 16384
 _SETTLE_TIME = 1.0
 """Time after the start that the summary leaves out, s; half of a shorter walk."""
+_SURFACE = "wood"
+"""Floor that is heard, and walked on where sound is kept, unless one is named."""
 
 _DESCRIPTION = f"""\
-Watch a policy walk, steer it, film it, or have its figures.
+Watch a policy walk, hear it, steer it, film it, or have its figures.
 
 Where there is a display, a window opens; else figures are printed as it walks.
 
 {KEYS_HELP}"""
-
-_REPORTED = (
-    "speed",
-    "velocity_error_sq",
-    "landing_speed_mean",
-    "landing_speed_rms",
-    "apex_mean",
-    "duty_factor",
-    "stride_frequency",
-    "power",
-    "fall_rate",
-)
-"""Figures of a `Gait` that --json prints."""
 
 
 @dataclass
@@ -82,9 +80,15 @@ class PlayArgs:
     seed: int = 0
     """Seed of the initial states."""
     num_envs: int = 1
-    """Number of robots; the first is shown, the figures are of all."""
+    """Number of robots; the first is shown and heard, all other figures are of all."""
+    surface: str | None = None
+    """Floor to walk on and to hear, with physics at 1 ms: wood, carpet, tile or concrete. Unless
+    given, training's floor and physics, with a level (modelled, sounding as wood); with --wav or
+    --video, wood."""
+    wav: Path | None = None
+    """Keep the modelled sound of the first robot in this .wav file."""
     video: Path | None = None
-    """Film to this .mp4 file, without a window."""
+    """Film to this .mp4 file, with sound, without a window."""
     viewer: Literal["auto", "native", "none"] = "auto"
     """native opens a window, none does not, auto does where there is a display."""
     look: Look = "primitives"
@@ -103,7 +107,11 @@ class PlayArgs:
         if self.seconds is not None:
             _require("seconds", self.seconds, 0.0, _MAX_SECONDS, above=True)
         _require("num-envs", self.num_envs, 1, _MAX_ENVS)
-        _require("seed", self.seed, 0, 2**31 - 1)
+        check_seed(self.seed)
+        if self.surface is not None and self.surface not in FLOORS:
+            allowed = ", ".join(FLOORS)
+            raise MuteError(f"--surface must be one of {allowed}, got {self.surface!r}")
+        check_wav(self.wav)
         if self.video and self.video.suffix.lower() != ".mp4":
             raise MuteError(f"--video must name an .mp4 file, got {str(self.video)!r}")
         if self.video and self.viewer == "native":
@@ -113,6 +121,18 @@ class PlayArgs:
     def command(self) -> Command:
         """What the robots are asked to do at first."""
         return Command(self.vx, self.vy, self.wz, self.beta)
+
+    @property
+    def floor(self) -> str | None:
+        """Name of the floor to walk on; None for training's."""
+        return self.surface or (_SURFACE if self.wav or self.video else None)
+
+    @property
+    def sound(self) -> Path | None:
+        """File for the sound; that of a video alone is beside it, until it is put in."""
+        if self.wav or not self.video:
+            return self.wav
+        return self.video.with_name(f"{self.video.stem}.{os.getpid()}.tmp.wav")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -136,32 +156,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     return status
 
 
-def report(session: Session) -> dict[str, Any]:
-    """Return what --json prints; figures that were not to be had are None."""
-    command = session.command
-    gait = session.gait().as_dict()
-    return {
-        "beta": command.beta,
-        "command": [command.vx, command.vy, command.wz],
-        "num_envs": session.env.num_envs,
-        "seconds": round(session.seconds, 6),
-        **{name: gait[name] if math.isfinite(gait[name]) else None for name in _REPORTED},
-    }
-
-
-def captions(gait: Gait) -> dict[str, str]:
-    """Return the figures to read as the robot walks, by name."""
-    figures = {
-        "speed": f"{gait.speed:z.2f} m/s",
-        "tracking error": f"{gait.velocity_error_sq:.4f} (m/s)^2",
-        "landing speed": f"{gait.landing_speed_mean:.3f} m/s",
-        "apex": f"{100.0 * gait.apex_mean:.1f} cm",
-        "duty factor": f"{gait.duty_factor:.2f}",
-        "strides": f"{gait.stride_frequency:.2f} Hz",
-    }
-    return {name: "-" if text.startswith("nan") else text for name, text in figures.items()}
-
-
 def _play(args: PlayArgs) -> tuple[Session, int]:
     """Walk as asked and return the walk and the exit status."""
     use_collection_threads()
@@ -178,8 +172,12 @@ def _play(args: PlayArgs) -> tuple[Session, int]:
     except KeyboardInterrupt:
         print(f"interrupted after {session.seconds:.1f} s", file=sys.stderr)
         status = EXIT_INTERRUPTED
+    if args.wav:
+        clipped = session.ear.clipped if session.ear else 0
+        note = f" ({clipped} samples are clipped)" if clipped else ""
+        print(f"sound: {args.wav}{note}", file=sys.stderr)
     if not args.json:
-        _print_summary(session)
+        _print_summary(session, args.floor)
     return session, status
 
 
@@ -206,18 +204,41 @@ def _make_session(args: PlayArgs, endless: bool) -> Session:
     if args.task is not None and policy.task != args.task:
         raise MuteError(f"{_policy_path(args)} is of task {policy.task!r}, not {args.task!r}")
     seconds = _MAX_SECONDS if endless else args.seconds or _DEFAULT_SECONDS
+    settle_time = min(_SETTLE_TIME, 0.5 * seconds)
+    env = _make_env(args, policy, seconds)
+    ear = _make_ear(args, env, settle_time)
+    _print_header(args, policy)
+    controller = LearnedController(policy, args.num_envs)
+    return Session(env, controller, args.command, settle_time, ear)
+
+
+def _make_env(args: PlayArgs, policy: Policy, seconds: float) -> QuadrupedEnv:
+    """Return the robots, on a floor and with physics that can be heard if that is wanted.
+
+    Raises:
+        MuteError: If the robot cannot look as asked, or the policy's rate goes with no floor.
+    """
     cfg = evaluation_cfg(policy.cfg.env, args.num_envs, seconds, args.seed)
     # All walk along x, so that the camera has the same view of every walk.
     cfg = dataclasses.replace(
         cfg, random_heading=False, scene=dataclasses.replace(cfg.scene, look=args.look)
     )
+    if args.floor or not args.json:
+        try:
+            cfg = audible_cfg(cfg, args.floor)
+        except ValueError as error:
+            raise MuteError(f"--surface {args.floor}: {error}") from error
     try:
-        env = QuadrupedEnv(cfg)
+        return QuadrupedEnv(cfg)
     except SceneError as error:
         raise MuteError(str(error)) from error
-    _print_header(args, policy)
-    settle_time = min(_SETTLE_TIME, 0.5 * seconds)
-    return Session(env, LearnedController(policy, args.num_envs), args.command, settle_time)
+
+
+def _make_ear(args: PlayArgs, env: QuadrupedEnv, settle_time: float) -> Ear | None:
+    if not env.cfg.scene.foot_forces:
+        return None
+    surface = args.floor or _SURFACE
+    return Ear(env, surface, load_gains(), settle_time, args.seed, args.sound)
 
 
 def _policy_path(args: PlayArgs) -> Path:
@@ -251,22 +272,28 @@ def _walk_in_window(args: PlayArgs, session: Session) -> None:
         return {
             "beta": f"{command.beta:.2f}",
             "command": f"{command.vx:.2f} {command.vy:.2f} m/s {command.wz:.2f} rad/s",
-            **captions(session.recent_gait()),
+            **live_captions(session),
         }
 
     print(KEYS_HELP, flush=True)
     num_steps = None if args.seconds is None else _num_steps(args, session)
-    watch(session, num_steps, shown)
+    with session.ear or contextlib.nullcontext():
+        watch(session, num_steps, shown)
 
 
 def _walk_on_video(args: PlayArgs, session: Session, path: Path) -> None:
-    video = Video(path, session.env)
+    video = Video(path, session.env, args.sound)
     try:
         with video:
             _walk_in_text(args, session, video.record)
     except KeyboardInterrupt:
         print(f"{path} holds what was filmed so far", file=sys.stderr)
         raise
+    finally:
+        if video.silent_because:
+            print(f"{path} is without sound: {video.silent_because}", file=sys.stderr)
+        if args.sound and not args.wav:
+            args.sound.unlink(missing_ok=True)
     print(f"video: {path} ({video.frame_rate:.0f} pictures a second)", file=sys.stderr)
 
 
@@ -277,14 +304,15 @@ def _walk_in_text(
     num_steps = _num_steps(args, session)
     per_second = round(1.0 / session.env.step_dt)
     show_bar = on_step is not None and not args.json and sys.stderr.isatty()
-    with _progress(num_steps, show_bar) as advance:
+    heard = session.ear or contextlib.nullcontext()
+    with heard, _progress(num_steps, show_bar) as advance:
         for _ in range(num_steps):
             session.step()
             if on_step is not None:
                 on_step()
             advance()
             if session.steps % per_second == 0 and not (show_bar or args.json):
-                figures = [f"{k} {v}" for k, v in captions(session.recent_gait()).items()]
+                figures = [f"{k} {v}" for k, v in live_captions(session).items()]
                 print(f"{session.seconds:5.1f} s", *figures, sep=" | ", flush=True)
 
 
@@ -304,21 +332,17 @@ def _print_header(args: PlayArgs, policy: Policy) -> None:
     command = args.command
     print(
         f"{policy.task}, iteration {policy.iteration}: beta {command.beta:g}, asked for "
-        f"{command.vx:g} m/s forward, {command.vy:g} m/s left, {command.wz:g} rad/s",
+        f"{command.vx:g} m/s forward, {command.vy:g} m/s left, {command.wz:g} rad/s"
+        + (f", on {args.floor}" if args.floor else ""),
         flush=True,
     )
 
 
-def _print_summary(session: Session) -> None:
-    gait, robots = session.gait(), session.env.num_envs
+def _print_summary(session: Session, floor: str | None) -> None:
+    robots = session.env.num_envs
     print(f"\nover {session.seconds:.1f} s, {robots} robot{'s' * (robots > 1)}:")
-    figures = captions(gait) | {
-        "landing speed, rms": f"{gait.landing_speed_rms:.3f} m/s",
-        "power": f"{gait.power:.1f} W",
-        "fell": f"{100.0 * gait.fall_rate:.1f} % of the robots",
-    }
-    for name, text in figures.items():
-        print(f"  {name:20}{'-' if text.startswith('nan') else text}")
+    for name, text in summary(session, floor).items():
+        print(f"  {name:20}{text}")
 
 
 def _require(name: str, value: float, low: float, high: float, above: bool = False) -> None:

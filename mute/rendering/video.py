@@ -1,6 +1,7 @@
 """Record a walk as an H.264 video: off-screen pictures with the camera on the robot.
 
-What renders is chosen by `backend`, before mujoco is imported. Walking is left to the caller.
+What renders is chosen by `backend`, before mujoco is imported. Walking is left to the caller, and
+so is the sound: a WAV file that `sound_track` puts in at the end.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 
 from envs.quadruped_env import QuadrupedEnv
 from mute.errors import MuteError
+from mute.rendering.sound_track import add_sound
 
 __all__ = ["Video"]
 
@@ -36,18 +38,22 @@ class Video:
     leaving by another exception removes it.
     """
 
-    def __init__(self, path: Path, env: QuadrupedEnv) -> None:
+    def __init__(self, path: Path, env: QuadrupedEnv, sound: Path | None = None) -> None:
         """Prepare to render and make the file's directory; the file itself begins on entering.
 
         Args:
             path: The file, its name ending in .mp4; an old one is replaced at the end.
             env: The environment to look at.
+            sound: WAV file of the same walk, complete before the video is.
 
         Raises:
             MuteError: If the path cannot be a video, or nothing renders.
         """
         self.path = path
+        self.silent_because = ""
+        """Why the sound is not in the complete file, in one line."""
         self._env = env
+        self._sound = sound
         self._temporary = _temporary_name(path)
         self._steps = 0
         self._renderer, software = _make_renderer(env.model)
@@ -91,8 +97,7 @@ class Video:
         self._renderer.close()
         if exc_type is None or issubclass(exc_type, KeyboardInterrupt):
             try:
-                self._writer.close()
-                os.replace(self._temporary, self.path)
+                self._complete()
             except OSError as error:
                 self._discard()
                 raise _cannot_write(self.path, error) from error
@@ -108,6 +113,17 @@ class Video:
         self._steps += 1
         if self._steps % self._stride == 0:
             self._append()
+
+    def _complete(self) -> None:
+        """Close the file, put the sound in, and give it its name even if that fails."""
+        self._writer.close()
+        try:
+            if self._sound is not None:
+                add_sound(self._temporary, self._sound)
+        except MuteError as error:
+            self.silent_because = str(error)
+        finally:
+            os.replace(self._temporary, self.path)
 
     def _append(self) -> None:
         try:

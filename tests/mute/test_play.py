@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,9 +14,13 @@ import torch
 from tensordict import TensorDict
 
 from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
+from mute.acoustics.sound_level_meter import SoundLevelMeter
+from mute.acoustics.wav import read_wav
 from mute.checkpoint import save_checkpoint
 from mute.command_lines.arguments import REPOSITORY
-from mute.command_lines.play import PlayArgs, captions, main, report
+from mute.command_lines.play import PlayArgs, main
+from mute.command_lines.play_figures import captions, report
 from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
 from mute.errors import MuteError
 from mute.evaluation.trials import evaluation_cfg
@@ -75,6 +80,16 @@ def policy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope="module")
+def heard(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Path]:
+    """Return what a second of the shipped policy on tile prints, and its sound."""
+    path = tmp_path_factory.mktemp("sound") / "new" / "tile.wav"
+    words = ("--beta", "0", "--surface", "tile", "--wav", str(path), "--seconds", "1", "--json")
+    run = _play(*words)
+    assert run.returncode == 0, run.stderr
+    return json.loads(run.stdout), path
+
+
 # -- the command line, really run ----------------------------------------------------------------
 
 
@@ -97,7 +112,34 @@ def test_without_a_display_each_second_is_a_line_and_a_summary_ends_it(policy):
     assert len(seconds) == 2
     for figure in ("speed", "tracking error", "landing speed", "strides"):
         assert all(figure in line for line in seconds)
+    assert all(re.search(r"level \d\d\.\d dBA", line) for line in seconds)
     assert "over 2.0 s, 1 robot:" in run.stdout.splitlines()
+    # The floor is training's: wood is but what it is heard as.
+    assert re.search(r"MNL +\d\d\.\d dBA \(modelled, sounding as wood\)", run.stdout)
+
+
+def test_a_level_is_said_to_be_of_the_floor_walked_on_and_of_the_first_of_several_robots(policy):
+    run = _play("--policy", str(policy), "--seconds", "2", "--surface", "tile", "--num-envs", "2")
+    assert run.returncode == 0, run.stderr
+    assert "sounding as" not in run.stdout
+    assert re.search(r"MNL +\d\d\.\d dBA \(modelled, on tile, first robot\)", run.stdout)
+    assert re.search(r"level \d\d\.\d dBA \(first robot\)", run.stdout)
+
+
+def test_a_surface_adds_its_name_and_levels_above_the_fans_to_the_object(heard):
+    printed, _ = heard
+    assert set(printed) == REPORTED | {"surface", "mnl", "pnl", "laeq"}
+    assert printed["surface"] == "tile"
+    assert 55.0 < printed["mnl"] <= printed["pnl"] < 100.0
+    assert 55.0 < printed["laeq"] < 100.0
+
+
+def test_the_wav_file_has_the_whole_walk_and_is_louder_than_the_fan(heard):
+    samples, rate = read_wav(heard[1])
+    assert (rate, samples.shape) == (SAMPLE_RATE, (1, SAMPLE_RATE))
+    meter = SoundLevelMeter(rate)
+    meter.update(samples * WAV_FULL_SCALE)
+    assert 58.0 < meter.result()[0].laeq < 100.0  # the fan alone: 55
 
 
 def test_a_bad_beta_is_one_line_and_status_2():
@@ -121,6 +163,8 @@ def test_a_bad_beta_is_one_line_and_status_2():
         (("--num-envs", "-3"), "--num-envs must be at least 1 .* got -3"),
         (("--seed", "-1"), "--seed must be at least 0 .* got -1"),
         (("--task", "go2"), "--task must be one of go1_mute, .* got 'go2'"),
+        (("--surface", "ice"), "--surface must be one of wood, carpet, .* got 'ice'"),
+        (("--wav", "walk.mp3"), "--wav must name a .wav file, got 'walk.mp3'"),
         (("--video", "walk.avi"), "--video must name an .mp4 file, got 'walk.avi'"),
         (("--video", "walk.mp4", "--viewer", "native"), "not with --viewer native"),
         (("--beta", "soft"), "--beta.*'soft'; see --help"),
@@ -163,6 +207,13 @@ def test_a_window_without_a_display_is_refused(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(MuteError, match="--viewer native: there is no display"):
         main(["--viewer", "native"])
+
+
+def test_a_sound_that_cannot_be_written_is_told_by_its_path(policy, tmp_path):
+    path = tmp_path / "folder.wav"
+    path.mkdir()
+    with pytest.raises(MuteError, match=r"cannot write .*folder\.wav"):
+        main(["--viewer", "none", "--policy", str(policy), "--wav", str(path), "--json"])
 
 
 # -- what is walked and what is reported ---------------------------------------------------------

@@ -9,18 +9,22 @@ import sys
 from pathlib import Path
 
 import imageio.v3 as imageio
+import imageio_ffmpeg
 import numpy as np
 import pytest
 import torch
 from tensordict import TensorDict
 
 from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from mute.acoustics.listener import SAMPLE_RATE
+from mute.acoustics.wav import write_wav
 from mute.checkpoint import save_checkpoint
 from mute.command_lines.arguments import REPOSITORY
 from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
 from mute.errors import MuteError
 from mute.rendering import backend
 from mute.rendering.keys import press
+from mute.rendering.sound_track import add_sound
 from mute.runner import MuteRunner, policy_part
 from mute.session import Command, Session
 from networks.estimator import EstimatorCfg
@@ -37,10 +41,11 @@ from mute.rendering.video import Video
 folder = Path(sys.argv[1])
 env = QuadrupedEnv(QuadrupedEnvCfg(num_envs=2, num_threads=1, random_heading=False))
 env.simulation.qpos[0, :2] = torch.zeros(2)
-with Video(folder / "new" / "whole.mp4", env) as video:
+with Video(folder / "new" / "whole.mp4", env, sound=folder / "gone.wav") as video:
     env.simulation.qpos[0, :2] = torch.tensor((7.0, -3.0))
     for _ in range(4):
         video.record()
+print(video.silent_because)
 try:
     with Video(folder / "broken.mp4", env) as video:
         raise ValueError("broken walk")
@@ -100,7 +105,10 @@ def films(tmp_path_factory: pytest.TempPathFactory, environ: dict[str, str]) -> 
         text=True,
         check=False,
     )
-    assert (run.returncode, run.stdout) == (0, "broken walk\n"), run.stderr
+    assert run.returncode == 0, run.stderr
+    reason, last = run.stdout.splitlines()
+    assert "No such file" in reason
+    assert last == "broken walk"
     return folder
 
 
@@ -148,7 +156,54 @@ def test_play_finds_a_backend_and_a_film_that_is_interrupted_is_kept(tmp_path, e
     frames = imageio.imread(path)
     assert len(frames) >= 25
     assert np.abs(frames[0].astype(int) - frames[20]).max() > 100  # the robot moves
+    sound = _sound_of(path)
+    assert len(sound) > 0.5 * SAMPLE_RATE
+    assert np.abs(sound).max() > 0.0  # the fan at least
     assert sorted(tmp_path.iterdir()) == [policy, path]
+
+
+# -- the sound of a video ------------------------------------------------------------------------
+
+
+def _sound_of(film: Path) -> np.ndarray:
+    """Return the samples of a film's sound, full scale is 1; none where it is silent."""
+    ffmpeg = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", str(film)]
+    run = subprocess.run(
+        [*ffmpeg, "-map", "0:a", "-ac", "1", "-f", "s16le", "-"], capture_output=True, check=False
+    )
+    return np.frombuffer(run.stdout, "<i2") / 32768.0
+
+
+@pytest.fixture
+def film(tmp_path: Path) -> Path:
+    """Return a silent film of half a second, as small as can be."""
+    pictures = np.linspace(0, 255, 25)[:, None, None, None] * np.ones((1, 32, 32, 3))
+    path = tmp_path / "film.mp4"
+    imageio.imwrite(path, pictures.astype(np.uint8), fps=50)
+    return path
+
+
+def test_a_film_gets_the_sound_and_keeps_its_pictures(film):
+    before = imageio.imread(film)
+    wav = film.with_name("tone.wav")
+    tone = 0.5 * np.sin(2.0 * np.pi * 1000.0 * np.arange(24000) / 48000.0)
+    write_wav(wav, tone, 48000)
+    add_sound(film, wav)
+    np.testing.assert_array_equal(imageio.imread(film), before)
+    sound = _sound_of(film)
+    assert len(sound) == pytest.approx(24000, abs=1024)  # a frame of AAC
+    assert np.sqrt(np.mean(sound[2400:21600] ** 2)) == pytest.approx(0.5 / np.sqrt(2.0), rel=0.02)
+    assert sorted(film.parent.iterdir()) == [film, wav]
+
+
+def test_a_sound_that_cannot_be_read_leaves_the_film_as_it_was(film):
+    before = film.read_bytes()
+    wav = film.with_name("broken.wav")
+    wav.write_bytes(b"no sound at all")
+    with pytest.raises(MuteError, match="Invalid data"):
+        add_sound(film, wav)
+    assert film.read_bytes() == before
+    assert sorted(film.parent.iterdir()) == [wav, film]
 
 
 # -- backends ------------------------------------------------------------------------------------

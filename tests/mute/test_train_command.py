@@ -136,6 +136,8 @@ def test_tensorboard_has_every_reward_term_loss_estimator_error_and_landing_spee
         "Gait/velocity_error_sq",
         "Gait/landing_speed_low_beta",
         "Gait/landing_speed_high_beta",
+        "Noise/landing_level_low_beta",
+        "Noise/landing_level_high_beta",
         "Perf/total_fps",
         "Curriculum/quiet",
     }

@@ -1,0 +1,303 @@
+"""`evaluate.py noise`, `sweep-speed` and `sweep-beta`: modelled noise levels of a policy."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+
+from mute.acoustics.floors import FLOORS
+from mute.acoustics.gains import load_gains
+from mute.acoustics.soundscape import SOURCES
+from mute.command_lines.arguments import (
+    REPOSITORY,
+    Numbers,
+    Words,
+    check_betas,
+    check_distinct,
+    check_seed,
+    check_trials,
+    check_wav,
+    make_directory,
+)
+from mute.command_lines.sound_options import (
+    check_sources,
+    find_microphone,
+    load_audible_policy,
+    progress_bar,
+    tell_clipped,
+)
+from mute.errors import MuteError
+from mute.evaluation.noise import SETTLE_TIME, NoiseRow, NoiseSetting, measure_noise
+from mute.evaluation.tables import print_table, write_csv, write_json
+from mute.provenance import machine_kind
+from mute.tasks import DEFAULT_TASK
+
+__all__ = ["NoiseArgs", "SweepBetaArgs", "SweepSpeedArgs", "noise", "sweep_beta", "sweep_speed"]
+
+_SPEEDS = tuple(round(0.1 * tenth, 1) for tenth in range(4, 11))
+_BETAS = tuple(round(0.1 * tenth, 1) for tenth in range(11))
+_MAX_ROBOTS = 1024
+
+_Draw = Callable[[Sequence[NoiseRow], Path], list[Path]]
+
+
+@dataclass
+class _CommonArgs:
+    policy: Path = REPOSITORY / "resources" / "go1" / f"{DEFAULT_TASK}.pt"
+    """Policy to measure."""
+    trials: int = 5
+    """Robots for each setting, side by side."""
+    seconds: float = 10.0
+    """Measured length of a trial, s."""
+    seed: int = 1
+    """Seed of initial states and of the noise."""
+    sources: Words = SOURCES
+    """What to hear: impacts, scuffing, drive, fan."""
+    microphone: str = "trunk"
+    """Where to listen: trunk, or X,Y,Z of a listener who walks along, m forward, left, and up from
+    the ground under the robot: 0,1,1.2."""
+    out: Path = Path("evaluation")
+    """Directory of the files that are written."""
+
+
+@dataclass
+class NoiseArgs(_CommonArgs):
+    """Noise levels on several floors at one commanded speed: the paper's protocol, modelled."""
+
+    surface: Words = ("wood", "carpet", "tile")
+    """Floors: wood, carpet, tile, concrete."""
+    beta: Numbers = (0.0, 1.0)
+    """Quiet factors."""
+    speed: float = 0.5
+    """Commanded forward speed, m/s."""
+    wav: Path | None = None
+    """Keep the sound of first trials: in FILE.wav where there is one floor and one beta, else in
+    FILE-<surface>-beta<beta>.wav."""
+
+
+@dataclass
+class SweepSpeedArgs(_CommonArgs):
+    """Noise levels against the actual speed, as figures and data."""
+
+    surface: str = "wood"
+    """Floor: wood, carpet, tile or concrete."""
+    beta: Numbers = (0.0, 1.0)
+    """Quiet factors."""
+    speed: Numbers = _SPEEDS
+    """Commanded forward speeds, m/s."""
+    wav: Path | None = None
+    """Keep the sound of first trials: in FILE.wav where there is one speed and one beta, else in
+    FILE-speed<speed>-beta<beta>.wav."""
+
+
+@dataclass
+class SweepBetaArgs(_CommonArgs):
+    """Noise levels and the squared tracking error against beta, as figures and data."""
+
+    surface: str = "wood"
+    """Floor: wood, carpet, tile or concrete."""
+    beta: Numbers = _BETAS
+    """Quiet factors."""
+    speed: float = 0.8
+    """Commanded forward speed, m/s."""
+    wav: Path | None = None
+    """Keep the sound of first trials: in FILE.wav where there is one beta, else in
+    FILE-speed<speed>-beta<beta>.wav."""
+
+
+def noise(args: NoiseArgs) -> None:
+    """Measure on each floor in turn.
+
+    Raises:
+        MuteError: If an argument is bad, or the policy cannot be used.
+    """
+    labels = [[f"{name}-beta{beta:g}" for beta in args.beta] for name in args.surface]
+    _run("noise", args, args.surface, (args.speed,), labels)
+
+
+def sweep_speed(args: SweepSpeedArgs) -> None:
+    """Measure all speeds and betas in one batch and draw them.
+
+    Raises:
+        MuteError: If an argument is bad, or the policy cannot be used.
+    """
+    from mute.evaluation.noise_figures import draw_speed_sweep  # matplotlib takes a second
+
+    labels = [[f"speed{speed:g}-beta{beta:g}" for beta in args.beta for speed in args.speed]]
+    _run("sweep_speed", args, (args.surface,), args.speed, labels, draw_speed_sweep)
+
+
+def sweep_beta(args: SweepBetaArgs) -> None:
+    """Measure all betas in one batch and draw them.
+
+    Raises:
+        MuteError: If an argument is bad, or the policy cannot be used.
+    """
+    from mute.evaluation.noise_figures import draw_beta_sweep
+
+    labels = [[f"speed{args.speed:g}-beta{beta:g}" for beta in args.beta]]
+    _run("sweep_beta", args, (args.surface,), (args.speed,), labels, draw_beta_sweep)
+
+
+def _run(
+    name: str,
+    args: NoiseArgs | SweepSpeedArgs | SweepBetaArgs,
+    surfaces: Sequence[str],
+    speeds: Sequence[float],
+    labels: Sequence[Sequence[str]],
+    draw: _Draw | None = None,
+) -> None:
+    """Check the arguments, measure every setting on every floor, and report.
+
+    Args:
+        name: Of the files.
+        args: What was asked for.
+        surfaces: Names of the floors.
+        speeds: Commanded speeds, m/s.
+        labels: For each floor, what tells the sounds of its settings apart; betas come first.
+        draw: Makes the figures.
+    """
+    _check(args, surfaces, args.beta, speeds)
+    check_wav(args.wav)
+    settings = [NoiseSetting(beta, speed) for beta in args.beta for speed in speeds]
+    rows = _measure(name, args, surfaces, settings, _wav_files(args.wav, labels))
+    _report(name, args, rows, draw)
+
+
+def _measure(
+    name: str,
+    args: _CommonArgs,
+    surfaces: Sequence[str],
+    settings: Sequence[NoiseSetting],
+    files: Sequence[dict[int, Path]],
+) -> list[NoiseRow]:
+    """Return the rows of every setting on every floor.
+
+    Args:
+        name: What is measured.
+        args: Its arguments.
+        surfaces: Names of the floors.
+        settings: What is asked for on each.
+        files: For each floor the files for the sound of settings, by their index.
+    """
+    policy, gains = load_audible_policy(args.policy), load_gains()
+    microphone = find_microphone(args.microphone)
+    make_directory(args.out)
+    torch.set_num_threads(1)  # the physics engine has the cores
+    steps = round((args.seconds + SETTLE_TIME) / policy.cfg.env.step_dt)
+    rows: list[NoiseRow] = []
+    done = itertools.count(1)
+    with progress_bar(name, len(surfaces) * steps) as advance:
+        for surface, wav in zip(surfaces, files, strict=True):
+            rows += measure_noise(
+                policy,
+                surface,
+                settings,
+                args.trials,
+                args.seconds,
+                args.seed,
+                gains,
+                wav,
+                on_step=lambda: advance(next(done)),
+                microphone=microphone,
+                sources=args.sources,
+                on_clipped=tell_clipped,
+            )
+    return rows
+
+
+def _wav_files(path: Path | None, labels: Sequence[Sequence[str]]) -> list[dict[int, Path]]:
+    """Return the files for the sound of each floor's settings, by their index.
+
+    Args:
+        path: What was asked for.
+        labels: For each floor, what tells the files of its settings apart.
+    """
+    if path is None:
+        return [{} for _ in labels]
+    if sum(map(len, labels)) == 1:
+        return [{0: path}]
+    return [
+        {
+            index: path.with_name(f"{path.stem}-{label}{path.suffix}")
+            for index, label in enumerate(own)
+        }
+        for own in labels
+    ]
+
+
+def _report(
+    name: str, args: _CommonArgs, rows: Sequence[NoiseRow], draw: _Draw | None = None
+) -> None:
+    """Print and write the rows, then draw them, so that no figure can cost the data."""
+    table = [dataclasses.asdict(row) for row in rows]
+    title = f"{args.trials} trials of {args.seconds:g} s; levels in dBA, modelled"
+    shown = [_shown(row) for row in rows]
+    print_table(title, shown, list(shown[0]))
+    write_csv(args.out / f"{name}.csv", table)
+    write_json(args.out / f"{name}.json", table)
+    about = {
+        "policy": os.path.relpath(args.policy, REPOSITORY),
+        "seconds": args.seconds,
+        "seed": args.seed,
+        "sources": args.sources,
+        "microphone": args.microphone,
+        "machine": machine_kind(),
+    }
+    write_json(args.out / f"{name}_about.json", about)
+    figures = draw(rows, args.out) if draw else []
+    names = [f"{name}.json", f"{name}.csv", *(path.name for path in figures)]
+    print(f"written to {args.out}: {', '.join(names)}")
+
+
+def _shown(row: NoiseRow) -> dict[str, str]:
+    """Return a row as a terminal of 100 columns can show it; the files have every figure."""
+    return {
+        "floor": row.surface,
+        "beta": f"{row.beta:g}",
+        "MNL": f"{row.mnl_mean:.1f}±{row.mnl_std:.1f}",
+        "PNL": f"{row.pnl_mean:.1f}±{row.pnl_std:.1f}",
+        "m/s,asked": f"{row.speed_mean:.2f},{row.command_speed:.2f}",
+        "err²": f"{row.velocity_error_sq:.3f}",
+        "land": f"{row.landing_speed_rms:.2f}",
+        "duty": f"{row.duty_factor:.2f}",
+        "Hz": f"{row.stride_frequency:.2f}",
+        "W": f"{row.power:.0f}",
+        "CoT": f"{row.cost_of_transport:.2f}",
+        "fell": f"{row.fall_rate:.0%}",
+    }
+
+
+def _check(
+    args: _CommonArgs, surfaces: Sequence[str], betas: Sequence[float], speeds: Sequence[float]
+) -> None:
+    """Check what all three have.
+
+    Raises:
+        MuteError: If a value is out of its range, or a list empty or with repetitions.
+    """
+    check_trials(args.trials, args.seconds)
+    check_seed(args.seed)
+    check_betas(betas)
+    check_sources(args.sources)
+    find_microphone(args.microphone)
+    for option, values in (("surface", surfaces), ("beta", betas), ("speed", speeds)):
+        check_distinct(option, values)
+    for surface in surfaces:
+        if surface not in FLOORS:
+            raise MuteError(f"--surface must be of {', '.join(FLOORS)}, got {surface!r}")
+    for speed in speeds:
+        if not 0.0 < speed <= 2.0:
+            raise MuteError(f"--speed must be in (0, 2], got {speed:g}")
+    settings = len(betas) * len(speeds)
+    if settings * args.trials > _MAX_ROBOTS:
+        raise MuteError(
+            f"--trials {args.trials} with {settings} settings is {settings * args.trials} robots; "
+            f"at most {_MAX_ROBOTS} fit side by side"
+        )

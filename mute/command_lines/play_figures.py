@@ -1,0 +1,91 @@
+"""The figures of a walk as `play.py` tells them: one JSON object, a line a second, a summary."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from mute.evaluation.gait import Gait
+from mute.session import Session
+
+__all__ = ["captions", "live_captions", "report", "summary"]
+
+_REPORTED = (
+    "speed",
+    "velocity_error_sq",
+    "landing_speed_mean",
+    "landing_speed_rms",
+    "apex_mean",
+    "duty_factor",
+    "stride_frequency",
+    "power",
+    "fall_rate",
+)
+"""Figures of a `Gait` that --json prints."""
+
+
+def report(session: Session) -> dict[str, Any]:
+    """Return what --json prints; figures that were not to be had are None."""
+    command, ear = session.command, session.ear
+    gait = session.gait().as_dict()
+    figures = {name: gait[name] for name in _REPORTED} | (ear.levels() if ear else {})
+    return {
+        "beta": command.beta,
+        "command": [command.vx, command.vy, command.wz],
+        "num_envs": session.env.num_envs,
+        "seconds": round(session.seconds, 6),
+        **({"surface": ear.surface} if ear else {}),
+        **{name: value if math.isfinite(value) else None for name, value in figures.items()},
+    }
+
+
+def captions(gait: Gait) -> dict[str, str]:
+    """Return the figures to read as the robot walks, by name."""
+    figures = {
+        "speed": f"{gait.speed:z.2f} m/s",
+        "tracking error": f"{gait.velocity_error_sq:.4f} (m/s)^2",
+        "landing speed": f"{gait.landing_speed_mean:.3f} m/s",
+        "apex": f"{100.0 * gait.apex_mean:.1f} cm",
+        "duty factor": f"{gait.duty_factor:.2f}",
+        "strides": f"{gait.stride_frequency:.2f} Hz",
+    }
+    return {name: _or_dash(text) for name, text in figures.items()}
+
+
+def live_captions(session: Session) -> dict[str, str]:
+    """Return the figures since this was last asked, and the level of now if there is an ear.
+
+    The level is the first robot's, which is said where there are several.
+    """
+    figures = captions(session.recent_gait())
+    if session.ear is not None:
+        whose = " (first robot)" if session.env.num_envs > 1 else ""
+        figures["level"] = _or_dash(f"{session.ear.level():.1f} dBA{whose}")
+    return figures
+
+
+def summary(session: Session, floor: str | None) -> dict[str, str]:
+    """Return the figures of the whole walk, by name.
+
+    Args:
+        session: The walk.
+        floor: Name of the floor that was walked on; None where it was training's, which only
+            sounds as the ear's surface.
+    """
+    gait = session.gait()
+    figures = captions(gait) | {
+        "landing speed, rms": f"{gait.landing_speed_rms:.3f} m/s",
+        "power": f"{gait.power:.1f} W",
+        "fell": f"{100.0 * gait.fall_rate:.1f} % of the robots",
+    }
+    if session.ear is not None:
+        levels = session.ear.levels()
+        about = ["modelled", f"on {floor}" if floor else f"sounding as {session.ear.surface}"]
+        about += ["first robot"] * (session.env.num_envs > 1)
+        for name in ("mnl", "pnl"):
+            figures[f"level, {name.upper()}"] = f"{levels[name]:.1f} dBA ({', '.join(about)})"
+    return {name: _or_dash(text) for name, text in figures.items()}
+
+
+def _or_dash(text: str) -> str:
+    return "-" if text.startswith("nan") else text

@@ -1,0 +1,101 @@
+"""What the command lines that measure sound share: sources, microphone, policies, progress."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from mute.acoustics.microphone import Microphone
+from mute.acoustics.soundscape import SOURCES
+from mute.command_lines.arguments import check_distinct
+from mute.controllers import load_policy
+from mute.controllers.learned import Policy
+from mute.errors import MuteError
+from mute.evaluation.listening import listening_cfg
+
+__all__ = [
+    "check_sources",
+    "find_microphone",
+    "load_audible_policy",
+    "progress_bar",
+    "tell_clipped",
+]
+
+_FARTHEST = 100.0
+"""Largest coordinate of a microphone, m."""
+
+
+def check_sources(sources: Sequence[str]) -> None:
+    """Check --sources.
+
+    Raises:
+        MuteError: If there is none, one is not known, or one is named twice.
+    """
+    check_distinct("sources", sources)
+    for name in sources:
+        if name not in SOURCES:
+            raise MuteError(f"--sources must be of {', '.join(SOURCES)}, got {name!r}")
+
+
+def find_microphone(text: str) -> Microphone:
+    """Return the microphone that --microphone names.
+
+    Args:
+        text: `trunk`, or `X,Y,Z`: the place of a listener who walks along, m forward, to the left,
+            and up from the ground under the robot.
+
+    Raises:
+        MuteError: If it is neither, below the ground, or too far away.
+    """
+    if text == "trunk":
+        return Microphone()
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise MuteError(f"--microphone must be trunk or X,Y,Z in m, got {text!r}") from None
+    if not (all(abs(value) <= _FARTHEST for value in (x, y, z)) and z >= 0.0):
+        raise MuteError(
+            f"--microphone must be within {_FARTHEST:g} m and not below the ground, got {text!r}"
+        )
+    return Microphone((x, y, z), "beside")
+
+
+def load_audible_policy(path: Path) -> Policy:
+    """Return a policy that can be heard.
+
+    Raises:
+        MuteError: If it cannot be used, or acts at times that lie between the physics steps.
+    """
+    policy = load_policy(path)
+    try:
+        listening_cfg(policy.cfg.env)
+    except ValueError as error:
+        raise MuteError(f"{path} cannot be heard: {error}") from error
+    return policy
+
+
+@contextlib.contextmanager
+def progress_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
+    """Show on standard error how far a work is and what time is left.
+
+    Args:
+        title: What is done.
+        total: What there is to do, in any unit.
+
+    Yields:
+        What is told how much is done in all.
+    """
+    columns = (TextColumn(title), BarColumn(), TextColumn("left"), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task = progress.add_task(title, total=total)
+        yield lambda done: progress.update(task, completed=done)
+
+
+def tell_clipped(path: Path, samples: int) -> None:
+    """Print on standard error how many samples of a file are clipped."""
+    print(f"{path}: {samples} samples are clipped", file=sys.stderr)

@@ -1,0 +1,146 @@
+"""`evaluate.py walk`: the long walk over mixed floors, its levels and its map."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+
+from mute.acoustics.gains import load_gains
+from mute.acoustics.soundscape import SOURCES
+from mute.command_lines.arguments import (
+    REPOSITORY,
+    Words,
+    check_betas,
+    check_seed,
+    check_wav,
+    make_directory,
+)
+from mute.command_lines.sound_options import (
+    check_sources,
+    find_microphone,
+    load_audible_policy,
+    progress_bar,
+    tell_clipped,
+)
+from mute.controllers import LearnedController
+from mute.evaluation.course import Course, load_course
+from mute.evaluation.tables import print_table, write_csv, write_json
+from mute.evaluation.walk import Walk, follow_course, make_walk_env
+from mute.provenance import machine_kind
+from mute.tasks import DEFAULT_TASK
+
+__all__ = ["WalkArgs", "walk"]
+
+
+@dataclass
+class WalkArgs:
+    """Follow a course over several floors, and map the modelled levels along it."""
+
+    course: Path = REPOSITORY / "resources" / "courses" / "office.yaml"
+    """Course to walk: path, floors and speed (YAML)."""
+    policy: Path = REPOSITORY / "resources" / "go1" / f"{DEFAULT_TASK}.pt"
+    """Policy to measure."""
+    beta: float = 0.5
+    """Quiet factor."""
+    hold_speed: bool = False
+    """Command more than the course's speed where the robot falls behind it, as quiet ones do, so
+    that different betas walk equally fast; unless given, the command is the course's speed."""
+    seed: int = 1
+    """Seed of the initial state and of the noise."""
+    sources: Words = SOURCES
+    """What to hear: impacts, scuffing, drive, fan."""
+    microphone: str = "trunk"
+    """Where to listen: trunk, or X,Y,Z of a listener who walks along, m forward, left, and up from
+    the ground under the robot: 0,1,1.2."""
+    out: Path = Path("evaluation")
+    """Directory of the files that are written."""
+    wav: Path | None = None
+    """Keep the sound at the microphone in this .wav file."""
+
+
+def walk(args: WalkArgs) -> None:
+    """Walk a course, print its figures, and write them, the track and the map.
+
+    Raises:
+        MuteError: If an argument or the course is bad, or the policy cannot be used.
+    """
+    check_betas([args.beta])
+    check_seed(args.seed)
+    check_sources(args.sources)
+    check_wav(args.wav)
+    microphone = find_microphone(args.microphone)
+    course, policy = load_course(args.course), load_audible_policy(args.policy)
+    gains = load_gains()
+    make_directory(args.out)  # now: a walk is long, and must not be in vain
+    torch.set_num_threads(1)
+    env = make_walk_env(policy.cfg.env, course, args.seed)
+    with progress_bar("walk", course.length) as advance:
+        result = follow_course(
+            env,
+            LearnedController(policy, env.num_envs),
+            course,
+            args.beta,
+            gains,
+            args.seed,
+            args.hold_speed,
+            args.wav,
+            advance,
+            microphone=microphone,
+            sources=args.sources,
+            on_clipped=tell_clipped,
+        )
+    print(_story(result, course))
+    files = _write(args, course, result, policy.iteration)
+    print(f"written to {args.out}: {', '.join(files)}")
+
+
+def _write(args: WalkArgs, course: Course, result: Walk, iteration: int) -> list[str]:
+    about = {
+        "course": os.path.relpath(args.course, REPOSITORY),
+        "policy": os.path.relpath(args.policy, REPOSITORY),
+        "iteration": iteration,
+        "beta": args.beta,
+        "course_speed": course.speed,
+        "hold_speed": args.hold_speed,
+        "seed": args.seed,
+        "sources": args.sources,
+        "microphone": args.microphone,
+        "machine": machine_kind(),
+    }
+    write_json(args.out / "walk.json", about | result.figures())
+    files = ["walk.json"]
+    rows = result.track.rows()
+    if len(rows) < 2:
+        return files
+    table = [dataclasses.asdict(floor) for floor in result.floors]
+    whole = {"floor": "all", "mnl": result.mnl, "pnl": result.pnl}
+    whole["seconds"] = sum(floor.seconds for floor in result.floors)
+    title = f"levels in dBA, modelled; LAeq {result.laeq:.1f} dBA"
+    print_table(title, [*table, whole], ["floor", "mnl", "pnl", "seconds"])
+    write_csv(args.out / "track.csv", rows)
+    from mute.evaluation.course_map import draw_map  # matplotlib takes a second
+
+    maps = draw_map(course, result.track, args.out)
+    return [*files, "track.csv", *(path.name for path in maps)]
+
+
+def _story(result: Walk, course: Course) -> str:
+    """Return in one line how far the robot came."""
+    way = f"{result.progress:.1f} m of {result.path_length:.1f} m"
+    if result.end == "arrived":
+        start = f"arrived after {result.path_length:.1f} m"
+    else:
+        x, y = result.position
+        floor = course.floor_names[int(course.floor_at(result.position))]
+        did = "fell" if result.end == "fell" else "ran out of time"
+        start = (
+            f"{did} after {way}, at ({x:.2f}, {y:.2f}) m on {floor}; the figures are of that part"
+        )
+    return (
+        f"{start}: {result.distance:.1f} m in {result.seconds:.1f} s, {result.speed_mean:.3f} m/s, "
+        f"at most {result.deviation_max:.2f} m off the path"
+    )

@@ -1,0 +1,217 @@
+"""How loud a policy walks: the paper's protocol, with all trials side by side.
+
+Every level here is modelled (`mute.acoustics`), not measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from scipy import stats
+
+from envs.quadruped_env import QuadrupedEnv
+from mute.acoustics.listener import HeardLevels, Listener
+from mute.acoustics.microphone import Microphone
+from mute.acoustics.soundscape import SOURCES
+from mute.controllers import LearnedController
+from mute.controllers.learned import Policy
+from mute.evaluation.gait import Gait
+from mute.evaluation.listening import make_listening_env
+from mute.evaluation.trials import evaluation_cfg, run_trial
+
+__all__ = [
+    "SETTLE_TIME",
+    "NoiseRow",
+    "NoiseSetting",
+    "measure_noise",
+    "report_clipped",
+    "robot_weight",
+]
+
+SETTLE_TIME = 1.0
+"""Time at the start of a trial that is walked but not measured, s."""
+
+
+@dataclass(frozen=True)
+class NoiseSetting:
+    """What the robots of some trials are asked for."""
+
+    beta: float
+    """Quiet factor."""
+    command_speed: float
+    """Commanded forward speed, m/s."""
+
+
+@dataclass
+class NoiseRow:
+    """Figures of the trials of one setting on one floor. Levels in dBA re 20 uPa, modelled."""
+
+    method: str
+    """What walks: the task of the policy."""
+    beta: float
+    """Quiet factor."""
+    surface: str
+    """Name of the floor."""
+    command_speed: float
+    """Commanded forward speed, m/s."""
+    trials: int
+    """Number of robots."""
+    mnl_mean: float
+    """Mean over trials of the mean noise level, dBA."""
+    mnl_std: float
+    """Standard deviation of it, dBA; NaN for one trial."""
+    mnl_ci95: float
+    """Half width of its 95 % confidence interval (Student's t), dBA; NaN for one trial."""
+    pnl_mean: float
+    """Mean over trials of the peak noise level, dBA."""
+    pnl_std: float
+    """Standard deviation of it, dBA."""
+    pnl_ci95: float
+    """Half width of its 95 % confidence interval, dBA."""
+    laeq_mean: float
+    """Mean over trials of the equivalent continuous level, dBA."""
+    speed_mean: float
+    """Mean actual forward speed, m/s."""
+    velocity_error_sq: float
+    """Mean of |v_xy^cmd - v_xy|^2, (m/s)^2."""
+    landing_speed_mean: float
+    """Mean over landings of the landing speed, m/s."""
+    landing_speed_rms: float
+    """Root mean square of it, m/s."""
+    apex_mean: float
+    """Mean over swings of the highest clearance, m."""
+    duty_factor: float
+    """Share of the time that a foot is on the ground."""
+    stride_frequency: float
+    """Landings of a foot per second, Hz."""
+    power: float
+    """Mechanical power of the joints, W."""
+    cost_of_transport: float
+    """Power over weight times actual speed."""
+    fall_rate: float
+    """Share of the robots that fell."""
+
+
+def measure_noise(
+    policy: Policy,
+    surface: str,
+    settings: Sequence[NoiseSetting],
+    trials: int,
+    seconds: float,
+    seed: int,
+    gains: Mapping[str, float],
+    wav: Mapping[int, Path] | None = None,
+    microphone: Microphone | None = None,
+    sources: Sequence[str] = SOURCES,
+    on_step: Callable[[], None] | None = None,
+    on_clipped: Callable[[Path, int], None] | None = None,
+) -> list[NoiseRow]:
+    """Walk straight ahead on a floor and return each setting's figures.
+
+    A robot that falls starts again; its figures leave out the fall and `SETTLE_TIME` after it.
+
+    Args:
+        policy: What walks.
+        surface: Name of the floor.
+        settings: What is asked for; their trials walk side by side, in one batch.
+        trials: Robots for each setting, which differ in their initial state and in their noise.
+        seconds: Measured length of a trial, after `SETTLE_TIME`, s.
+        seed: Seed of initial states and of the noise.
+        gains: Calibration gain of each floor.
+        wav: Files for the sound of each setting's first trial, by the setting's index; they begin
+            after `SETTLE_TIME`.
+        microphone: Where to listen. Default: on the trunk.
+        sources: What to hear, of `soundscape.SOURCES`.
+        on_step: Called after each control step, of which there are `(seconds + SETTLE_TIME) /
+            step_dt`.
+        on_clipped: Called with each file that has samples beyond full scale, and their number.
+
+    Raises:
+        MuteError: If a file cannot be written.
+        ValueError: If the floor or a source is not known.
+    """
+    robots = len(settings) * trials
+    cfg = evaluation_cfg(policy.cfg.env, robots, seconds + SETTLE_TIME, seed)
+    env = make_listening_env(cfg, surface)
+    commands = torch.zeros(robots, 4)
+    for index, setting in enumerate(settings):
+        chosen = slice(index * trials, (index + 1) * trials)
+        commands[chosen, 0], commands[chosen, 3] = setting.command_speed, setting.beta
+    files = {index * trials: path for index, path in (wav or {}).items()}
+    listener = Listener(env, [surface], 0, microphone, gains, sources, SETTLE_TIME, seed, files)
+
+    def hear(_: object, dones: torch.Tensor) -> None:
+        listener.listen(dones)
+        if on_step is not None:
+            on_step()
+
+    steps = round((seconds + SETTLE_TIME) / env.step_dt)
+    with listener:
+        meter = run_trial(env, LearnedController(policy, robots), commands, steps, hear)
+    report_clipped(listener, on_clipped)
+    levels = listener.levels()
+    weight = robot_weight(env)
+    rows = []
+    for index, setting in enumerate(settings):
+        chosen = torch.zeros(robots, dtype=torch.bool)
+        chosen[index * trials : (index + 1) * trials] = True
+        own = levels[index * trials : (index + 1) * trials]
+        rows.append(_row(policy.task, surface, setting, meter.gait(chosen), own, weight))
+    return rows
+
+
+def report_clipped(listener: Listener, on_clipped: Callable[[Path, int], None] | None) -> None:
+    """Tell of each file of a listener that has samples beyond full scale."""
+    for path, samples in listener.clipped.items():
+        if samples and on_clipped is not None:
+            on_clipped(path, samples)
+
+
+def robot_weight(env: QuadrupedEnv) -> float:
+    """Return the robot's weight, N."""
+    return float(env.model.body_mass.sum()) * float(np.linalg.norm(env.model.opt.gravity))
+
+
+def _row(
+    method: str,
+    surface: str,
+    setting: NoiseSetting,
+    gait: Gait,
+    levels: Sequence[HeardLevels],
+    weight: float,
+) -> NoiseRow:
+    mnl, mnl_std, mnl_ci95 = _spread([trial.mnl for trial in levels])
+    pnl, pnl_std, pnl_ci95 = _spread([trial.pnl for trial in levels])
+    own = asdict(gait)
+    shared = {name: own[name] for name in NoiseRow.__dataclass_fields__ if name in own}
+    return NoiseRow(
+        method=method,
+        beta=setting.beta,
+        surface=surface,
+        command_speed=setting.command_speed,
+        trials=len(levels),
+        mnl_mean=mnl,
+        mnl_std=mnl_std,
+        mnl_ci95=mnl_ci95,
+        pnl_mean=pnl,
+        pnl_std=pnl_std,
+        pnl_ci95=pnl_ci95,
+        laeq_mean=float(np.mean([trial.laeq for trial in levels])),
+        speed_mean=gait.speed,
+        cost_of_transport=gait.power / (weight * gait.speed) if gait.speed > 0.0 else float("nan"),
+        **shared,
+    )
+
+
+def _spread(values: Sequence[float]) -> tuple[float, float, float]:
+    """Return mean, standard deviation and half width of the mean's 95 % confidence interval."""
+    count = len(values)
+    if count < 2:
+        return float(np.mean(values)), float("nan"), float("nan")
+    deviation = float(np.std(values, ddof=1))
+    half_width = float(stats.t.ppf(0.975, count - 1)) * deviation / count**0.5
+    return float(np.mean(values)), deviation, half_width

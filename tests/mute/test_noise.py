@@ -1,0 +1,122 @@
+"""Tests of the noise evaluation: the paper's protocol on the shipped policy, and its files."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+from scipy import stats
+
+from mute.acoustics import listener
+from mute.acoustics.calibration import fit_gain
+from mute.acoustics.floors import FLOORS
+from mute.acoustics.gains import load_gains
+from mute.acoustics.microphone import Microphone
+from mute.command_lines.arguments import REPOSITORY
+from mute.controllers import load_policy
+from mute.errors import MuteError
+from mute.evaluation.noise import NoiseRow, NoiseSetting, measure_noise
+
+
+def _measure(seed: int, trials: int = 5, seconds: float = 3.0, **options) -> list[NoiseRow]:
+    policy = load_policy(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
+    settings = [NoiseSetting(beta, 0.5) for beta in (0.0, 1.0)]
+    return measure_noise(policy, "wood", settings, trials, seconds, seed, load_gains(), **options)
+
+
+@pytest.fixture(scope="module")
+def rows() -> list[NoiseRow]:
+    return _measure(seed=1)
+
+
+def test_the_same_seed_gives_the_same_table(rows):
+    assert _measure(seed=1) == rows
+
+
+def test_a_policy_compared_with_itself_differs_by_less_than_its_confidence_interval(rows):
+    for first, second in zip(rows, _measure(seed=2), strict=True):
+        # Welch: the means differ, but zero lies within the interval of their difference.
+        welch = stats.ttest_ind_from_stats(
+            *(first.mnl_mean, first.mnl_std, 5), *(second.mnl_mean, second.mnl_std, 5), False
+        )
+        assert 0.05 < welch.pvalue < 1.0
+
+
+def test_every_control_step_is_told_and_a_source_can_be_heard_alone_from_afar():
+    steps = []
+    rows = _measure(
+        seed=1,
+        trials=1,
+        seconds=1.0,
+        microphone=Microphone((0.0, 2.0, 0.0), "beside"),
+        sources=("fan",),
+        on_step=lambda: steps.append(1),
+    )
+    assert len(steps) == 100  # a second to settle, and one that is measured
+    assert all(row.mnl_mean < 55.0 - 6.0 for row in rows)
+    assert rows[0].pnl_mean - rows[0].mnl_mean < 1.5
+
+
+def test_clipped_samples_are_told_with_their_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(listener, "WAV_FULL_SCALE", 0.01)
+    told = {}
+    files = {0: tmp_path / "loud.wav"}
+    _measure(seed=1, trials=1, seconds=0.5, wav=files, on_clipped=told.__setitem__)
+    assert list(told) == [files[0]]
+    assert told[files[0]] > 0
+
+
+def test_a_quiet_walk_is_quieter_than_a_loud_one_and_both_are_louder_than_the_fan(rows):
+    loud, quiet = rows
+    assert (loud.beta, quiet.beta) == (0.0, 1.0)
+    assert 55.0 < quiet.mnl_mean < loud.mnl_mean - 1.0
+    for row in rows:
+        assert row.mnl_mean < row.pnl_mean
+        assert row.fall_rate == 0.0
+
+
+def test_the_cost_of_transport_is_power_over_weight_and_speed(rows):
+    for row in rows:
+        assert row.cost_of_transport == pytest.approx(
+            row.power / (125.0 * row.speed_mean), rel=0.01
+        )
+
+
+def test_the_gain_is_the_one_that_reaches_the_target():
+    assert fit_gain(lambda gain: 60.0 + 20.0 * math.log10(gain), 66.0206) == pytest.approx(
+        2.0, rel=1e-3
+    )
+
+
+def test_a_level_that_other_sources_exceed_cannot_be_fitted():
+    with pytest.raises(ValueError, match="no gain gives 50 dB"):
+        fit_gain(lambda gain: 10.0 * math.log10(10.0**5.5 + gain**2), 50.0)
+
+
+def test_the_shipped_calibration_has_every_floor_and_where_it_comes_from():
+    content = json.loads((REPOSITORY / "resources/acoustics/calibration.json").read_text())
+    assert load_gains().keys() == FLOORS.keys() == content["floors"].keys()
+    for floor in content["floors"].values():
+        assert floor["source"]
+        if "target_mnl" in floor:
+            assert floor["mnl"] == pytest.approx(floor["target_mnl"], abs=0.02)
+    assert content["command"].startswith("python -m mute.acoustics.calibration ")
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        ("", "no calibration"),
+        ("{}", "'floors' is missing"),
+        ('{"floors": {"wood": {"gain": 1}}}', "'carpet' is missing"),
+        (json.dumps({"floors": {key: {"gain": -1.0} for key in FLOORS}}), "must be > 0"),
+    ],
+)
+def test_a_broken_calibration_is_refused_in_one_line(content, word, tmp_path):
+    path = tmp_path / "calibration.json"
+    path.write_text(content)
+    with pytest.raises(MuteError, match=word) as caught:
+        load_gains(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
