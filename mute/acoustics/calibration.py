@@ -25,6 +25,7 @@ from scipy.optimize import brentq
 
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import GAINS_FILE
+from mute.acoustics.listener import SAMPLE_RATE
 from mute.acoustics.recorder import Recorder
 from mute.acoustics.sound_level_meter import measure
 from mute.acoustics.soundscape import Soundscape
@@ -40,6 +41,7 @@ from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
 from mute.errors import MuteError, run_cli
 from mute.evaluation.listening import make_listening_env
+from mute.evaluation.noise import SETTLE_TIME
 from mute.evaluation.paper_levels import PAPER_LEVELS
 from mute.evaluation.tables import print_table, write_json
 from mute.evaluation.trials import evaluation_cfg, run_trial
@@ -54,10 +56,6 @@ _REFERENCES = {"mute": "mute beta 0", "dreamwaq": "dreamwaq"}
 _SAME_AS = {"concrete": "tile"}
 """Floors that the paper did not measure at 0.5 m/s, and the one whose gain they take (chosen: both
 are hard mineral slabs)."""
-
-_SAMPLE_RATE = 48000
-_SETTLE = 1.0
-"""Time at the start that is not measured, s."""
 
 
 @dataclass
@@ -160,7 +158,7 @@ def _fit_floor(args: CalibrationArgs, policy: Policy, floor: str, target: float)
     feet, rest = _walk(args, policy, floor)
 
     def levels(gain: float) -> tuple[float, float]:
-        trials = measure(gain * feet + rest, _SAMPLE_RATE)
+        trials = measure(gain * feet + rest, SAMPLE_RATE)
         mnl = float(np.mean([trial.mnl for trial in trials]))
         return mnl, float(np.mean([trial.pnl for trial in trials]))
 
@@ -180,11 +178,11 @@ def _fit_floor(args: CalibrationArgs, policy: Policy, floor: str, target: float)
 
 def _walk(args: CalibrationArgs, policy: Policy, floor: str) -> tuple[NDArray, NDArray]:
     """Return what the feet sound of, and all else, Pa. Shapes: (trials, samples)."""
-    cfg = evaluation_cfg(policy.cfg.env, args.trials, args.seconds + _SETTLE, args.seed)
+    cfg = evaluation_cfg(policy.cfg.env, args.trials, args.seconds + SETTLE_TIME, args.seed)
     env = make_listening_env(cfg, floor)
     recorder = Recorder(env)
     scapes = [
-        Soundscape(args.trials, [floor], None, _SAMPLE_RATE, args.seed, sources)
+        Soundscape(args.trials, [floor], None, SAMPLE_RATE, args.seed, sources)
         for sources in (("impacts", "scuffing"), ("drive", "fan"))
     ]
     heard: list[tuple[NDArray, ...]] = []
@@ -195,11 +193,11 @@ def _walk(args: CalibrationArgs, policy: Policy, floor: str) -> tuple[NDArray, N
         block = recorder.take()
         heard.append(tuple(scape.render(block) for scape in scapes))
 
-    steps = round((args.seconds + _SETTLE) / env.step_dt)
+    steps = round((args.seconds + SETTLE_TIME) / env.step_dt)
     command = torch.tensor((args.speed, 0.0, 0.0, 0.0))
     controller = LearnedController(policy, args.trials)
     run_trial(env, controller, command, steps, listen)
-    first = round(_SETTLE * _SAMPLE_RATE)
+    first = round(SETTLE_TIME * SAMPLE_RATE)
     feet, rest = (np.concatenate(part, axis=1)[:, first:] for part in zip(*heard, strict=True))
     return feet, rest
 

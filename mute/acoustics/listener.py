@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -29,6 +28,7 @@ from mute.acoustics.microphone import Microphone
 from mute.acoustics.recorder import FloorAt, Recorder
 from mute.acoustics.sound_level_meter import SoundLevelMeter
 from mute.acoustics.soundscape import SOURCES, Soundscape
+from mute.acoustics.wav import PCM, WavFormat, wav_header
 from mute.errors import MuteError
 
 __all__ = ["SAMPLE_RATE", "WAV_FULL_SCALE", "HeardLevels", "Listener", "WavFile"]
@@ -303,7 +303,7 @@ class WavFile:
         with self._told():
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("wb")
-            self._file.write(_wav_header(0))
+            self._file.write(self._header())
 
     def write(self, pressure: NDArray) -> None:
         """Append samples in Pa, up to the longest that a file can be. Shape: (samples,).
@@ -327,7 +327,10 @@ class WavFile:
         # Not with `wave`, which would leave a traceback behind where the file cannot be completed.
         with self._told(), self._file:
             self._file.seek(0)
-            self._file.write(_wav_header(self._samples))
+            self._file.write(self._header())
+
+    def _header(self) -> bytes:
+        return wav_header(WavFormat(PCM, 1, SAMPLE_RATE, 16, 16), 2 * self._samples)
 
     @contextlib.contextmanager
     def _told(self) -> Iterator[None]:
@@ -336,17 +339,6 @@ class WavFile:
             yield
         except OSError as error:
             raise MuteError(f"cannot write {self.path}: {error.strerror}") from error
-
-
-def _wav_header(samples: int) -> bytes:
-    """Return what precedes the samples of a mono file of 16 bits."""
-    return struct.pack(
-        "<4sI4s4sIHHIIHH4sI",
-        *(b"RIFF", 36 + 2 * samples, b"WAVE"),
-        # Size of the format, PCM, channels, samples and bytes a second, bytes and bits a sample.
-        *(b"fmt ", 16, 1, 1, SAMPLE_RATE, 2 * SAMPLE_RATE, 2, 16),
-        *(b"data", 2 * samples),
-    )
 
 
 def _decibels(ratio: float) -> float:

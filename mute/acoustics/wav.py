@@ -25,13 +25,21 @@ from numpy.typing import NDArray
 from mute.errors import MuteError
 from mute.files import replace_file
 
-__all__ = ["WavEncoding", "WavReader", "read_wav", "write_wav"]
+__all__ = [
+    "PCM",
+    "WavEncoding",
+    "WavFormat",
+    "WavReader",
+    "read_wav",
+    "wav_header",
+    "write_wav",
+]
 
 WavEncoding = Literal["float32", "int16", "int24"]
 """Encodings that are written."""
 
-_PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
-_READABLE = {(_PCM, 8), (_PCM, 16), (_PCM, 24), (_PCM, 32), (_FLOAT, 32), (_FLOAT, 64)}
+PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
+_READABLE = {(PCM, 8), (PCM, 16), (PCM, 24), (PCM, 32), (_FLOAT, 32), (_FLOAT, 64)}
 _UNTIL_THE_END = 0xFFFFFFFF
 """Length in the header of a file that was written to a pipe."""
 
@@ -43,7 +51,7 @@ _BLOCK = 1 << 16
 
 
 @dataclass(frozen=True)
-class _Format:
+class WavFormat:
     """How the samples of a file are stored."""
 
     code: int
@@ -182,13 +190,13 @@ def write_wav(
         raise ValueError(f"samples must be within -1 and 1 for {encoding}, got {peak:g}")
     data = _encode(samples.T, encoding)
     bits = int(encoding.removeprefix("float").removeprefix("int"))
-    code = _FLOAT if encoding == "float32" else _PCM
-    header = _header(_Format(code, len(samples), sample_rate, bits, bits), len(data))
+    code = _FLOAT if encoding == "float32" else PCM
+    header = wav_header(WavFormat(code, len(samples), sample_rate, bits, bits), len(data))
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, header + data + b"\0" * (len(data) % 2))
 
 
-def _read_header(file: BinaryIO, path: Path) -> tuple[_Format, int]:
+def _read_header(file: BinaryIO, path: Path) -> tuple[WavFormat, int]:
     """Return the format and the number of samples a channel; the file is left at the first one."""
     size = os.fstat(file.fileno()).st_size
     if size == 0:
@@ -223,7 +231,7 @@ def _read_header(file: BinaryIO, path: Path) -> tuple[_Format, int]:
     return wav_format, frames
 
 
-def _parse_format(data: bytes, path: Path) -> _Format:
+def _parse_format(data: bytes, path: Path) -> WavFormat:
     """Return what a format chunk says.
 
     Raises:
@@ -246,10 +254,10 @@ def _parse_format(data: bytes, path: Path) -> _Format:
         )
     if not 0 < valid_bits < bits:
         valid_bits = bits
-    return _Format(code, channels, sample_rate, bits, valid_bits)
+    return WavFormat(code, channels, sample_rate, bits, valid_bits)
 
 
-def _decode(data: bytes, wav_format: _Format) -> NDArray[np.float64]:
+def _decode(data: bytes, wav_format: WavFormat) -> NDArray[np.float64]:
     """Return samples as they follow each other in the file, full scale is 1."""
     if wav_format.code == _FLOAT:
         return np.frombuffer(data, dtype=f"<f{wav_format.bits // 8}").astype(np.float64)
@@ -263,7 +271,7 @@ def _decode(data: bytes, wav_format: _Format) -> NDArray[np.float64]:
     return whole.astype(np.float64) / 2.0 ** (wav_format.bits - 1)
 
 
-def _at_full_scale(block: NDArray[np.float64], wav_format: _Format) -> NDArray[np.int64]:
+def _at_full_scale(block: NDArray[np.float64], wav_format: WavFormat) -> NDArray[np.int64]:
     """Return how many samples have a value at which converters clip. Shape: (channels,)."""
     if wav_format.code == _FLOAT:  # which can go on beyond 1, so only 1 itself is suspicious
         return np.count_nonzero(np.abs(block) == 1.0, axis=1)
@@ -282,8 +290,12 @@ def _encode(frames: NDArray, encoding: WavEncoding) -> bytes:
     return np.ascontiguousarray(whole, dtype="<i4").view(np.uint8).reshape(-1, 4)[:, :3].tobytes()
 
 
-def _header(wav_format: _Format, data_bytes: int) -> bytes:
-    """Return the bytes before the samples."""
+def wav_header(wav_format: WavFormat, data_bytes: int) -> bytes:
+    """Return the bytes before the samples.
+
+    Raises:
+        ValueError: If there are more samples than a WAV file can hold.
+    """
     frame = wav_format.frame_bytes
     content = struct.pack(
         "<HHIIHH",
