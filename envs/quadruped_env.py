@@ -462,11 +462,6 @@ class QuadrupedEnv(VecEnv):
         log["Gait/duty_factor"] = self.footfalls.contact_share.mean()
         beta = command[:, 3]
         for name, chosen in (("low_beta", beta < 0.25), ("high_beta", beta > 0.75)):
-            # The sound energy of landings goes with the square of their speed: its sum over time is
-            # logged, with the silent steps in it. Sliding feet and motors are not in it.
-            if bool(chosen.any()):
-                per_robot = self.footfalls.landing_speed[chosen].square().sum() / chosen.sum()
-                log[f"Gait/landing_power_{name}"] = per_robot / self.step_dt
             landed = self.footfalls.touchdown & chosen.unsqueeze(1)
             if bool(landed.any()):
                 log[f"Gait/landing_speed_{name}"] = self.footfalls.landing_speed[landed].mean()

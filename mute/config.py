@@ -99,6 +99,8 @@ class AgentCfg:
     """Control steps of a rollout."""
     save_interval: int = 50
     """Iterations between checkpoints."""
+    noise_interval: int = 20
+    """Iterations between short trials that measure the modelled noise level; 0 for none."""
     actor_hidden: tuple[int, ...] = (256, 128, 64)
     """Widths of the actor's hidden layers."""
     critic_hidden: tuple[int, ...] = (256, 128, 64)
@@ -124,6 +126,7 @@ class AgentCfg:
             ValueError: If one is out of its range.
         """
         _check_from(1, self, "agent", "iterations", "num_steps_per_env", "save_interval")
+        _check_from(0, self, "agent", "noise_interval")
         _check_positive(self, "agent", "init_std")
         for name in ("actor_hidden", "critic_hidden"):
             widths = getattr(self, name)

@@ -129,4 +129,5 @@ class Ear:
 
         They are of the time since the start, without the last stretch until the ear is left.
         """
-        return dataclasses.asdict(self._listener.levels()[0])
+        levels = self._listener.levels()[0]
+        return {"mnl": levels.mnl, "pnl": levels.pnl, "laeq": levels.laeq}

@@ -2,9 +2,6 @@
 
 Built on rsl_rl's own hooks: a `LogWriter` for the curves and a subclass of its `Logger`, whose
 console page gives way to the display.
-
-The curves `Noise/landing_level_*` hold the modelled sound of landings and of the fan alone, at one
-mass for all feet; scuffing and drive are not in them, so `evaluate.py noise` gives higher levels.
 """
 
 from __future__ import annotations
@@ -17,7 +14,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import torch
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -26,9 +22,6 @@ from rsl_rl.utils import LogWriter
 from rsl_rl.utils.logger import Logger
 from torch.utils.tensorboard import SummaryWriter
 
-from mute.acoustics.energy import training_level
-from mute.acoustics.floors import FLOORS
-from mute.acoustics.gains import load_gains
 from mute.files import replace_file
 
 __all__ = ["CurveWriter", "LiveDisplay", "PlainDisplay", "TrainingLogger"]
@@ -40,25 +33,13 @@ _COLUMNS = {
     "Gait/landing_speed_low_beta": ("landing speed, beta < 0.25 (m/s)", "{:.3f}"),
     "Gait/landing_speed_high_beta": ("landing speed, beta > 0.75 (m/s)", "{:.3f}"),
     "Gait/apex_high_beta": ("apex, beta > 0.75 (m)", "{:.4f}"),
-    "Noise/landing_level_low_beta": (
-        "landing level on wood, beta < 0.25 (dBA, modelled)",
-        "{:.1f}",
-    ),
-    "Noise/landing_level_high_beta": (
-        "landing level on wood, beta > 0.75 (dBA, modelled)",
-        "{:.1f}",
-    ),
+    "Noise/level_beta_0": ("level on wood, beta 0 (dBA, modelled)", "{:.1f}"),
+    "Noise/level_beta_1": ("level on wood, beta 1 (dBA, modelled)", "{:.1f}"),
     "Train/mean_episode_length": ("episode (steps)", "{:.0f}"),
     "Loss/estimator_velocity_rmse": ("velocity RMSE (m/s)", "{:.3f}"),
     "Loss/estimator_phase_mae": ("phase MAE", "{:.3f}"),
 }
 """Curves that the display shows, with their captions."""
-
-_LANDING_POWER = "Gait/landing_power_"
-"""Curves of a robot's squared landing speeds per second, from which a level is modelled."""
-
-_FLOOR = "wood"
-"""Floor whose sound a training's curves are modelled for."""
 
 
 class CurveWriter(LogWriter):
@@ -78,7 +59,6 @@ class CurveWriter(LogWriter):
         )
         self._path = Path(log_dir) / "curves.jsonl"
         _drop_from(self._path, first_iteration)
-        self._gain = load_gains()[_FLOOR]
         self.latest: dict[str, float] = {}
         """The current iteration's scalars by tag."""
 
@@ -89,10 +69,6 @@ class CurveWriter(LogWriter):
             return
         self.latest[tag] = float(scalar_value)
         self._tensorboard.add_scalar(tag, scalar_value, global_step)
-        if tag.startswith(_LANDING_POWER):
-            level = _level(float(scalar_value), self._gain)
-            which = tag.removeprefix(_LANDING_POWER)
-            self.add_scalar(f"Noise/landing_level_{which}", level, global_step)
 
     def end_iteration(self, iteration: int) -> dict[str, float]:
         """Append the iteration's scalars to the file and return them."""
@@ -112,11 +88,20 @@ class TrainingLogger(Logger):
     def __init__(
         self,
         *args: Any,  # noqa: ANN401
+        measure: Callable[[int], dict[str, float]],
         on_iteration: Callable[[int, int, dict[str, float]], None],
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
-        """Take what `Logger` takes, and what to call with (iteration, total, scalars)."""
+        """Prepare to log.
+
+        Args:
+            *args: What `Logger` takes.
+            measure: Called with an iteration; returns further scalars for its curves.
+            on_iteration: Called with (iteration, total, scalars) at the end of each.
+            **kwargs: What `Logger` takes.
+        """
         super().__init__(*args, **kwargs)
+        self._measure = measure
         self._on_iteration = on_iteration
 
     def init_logging_writer(self) -> None:
@@ -132,6 +117,8 @@ class TrainingLogger(Logger):
         iteration, total = kwargs["it"], kwargs["total_it"]
         scalars: dict[str, float] = {}
         if isinstance(self.writer, CurveWriter):
+            for tag, value in self._measure(iteration).items():
+                self.writer.add_scalar(tag, value, iteration)
             scalars = self.writer.end_iteration(iteration)
         self._on_iteration(iteration, total, scalars)
 
@@ -210,17 +197,6 @@ class PlainDisplay:
         print(
             f"{iteration + 1}/{total}", *figures, f"left {left / 60:.1f} min", sep=" | ", flush=True
         )
-
-
-def _level(landing_power: float, gain: float) -> float:
-    """Return the modelled equivalent level of landings and fan at the trunk, dBA.
-
-    Args:
-        landing_power: Sum of squared landing speeds per second, (m/s)^2 / s.
-        gain: Calibration gain of the floor.
-    """
-    speed = torch.tensor([landing_power]).sqrt()
-    return float(training_level(speed, 1.0, FLOORS[_FLOOR], gain=gain))
 
 
 def _outlast_second_of_newest(log_dir: Path) -> None:

@@ -18,8 +18,10 @@ from envs.quadruped_env import QuadrupedEnv
 from mute.algorithm import EstimatorPPO
 from mute.checkpoint import CheckpointError, first_line, load_checkpoint, save_checkpoint
 from mute.config import TaskCfg, to_plain
+from mute.controllers.learned import make_policy
 from mute.estimated_env import EstimatedEnv
 from mute.estimation import EstimatorTrainer
+from mute.evaluation.noise_probe import NoiseProbe
 from mute.logger import TrainingLogger
 from networks.estimator import Estimator
 
@@ -82,8 +84,11 @@ class MuteRunner(OnPolicyRunner):
             gpu_world_size=self.gpu_world_size,
             gpu_global_rank=self.gpu_global_rank,
             device=device,
+            measure=self._measure_noise,
             on_iteration=self._end_iteration,
         )
+        self._noise_probe = NoiseProbe()
+        self._levels: dict[str, float] = {}
         self._on_iteration = on_iteration
         self._stop_requested = False
 
@@ -115,16 +120,20 @@ class MuteRunner(OnPolicyRunner):
 
     def save(self, path: str, infos: dict | None = None) -> None:
         """Save all that is needed to continue bit for bit, atomically."""
-        payload = self.alg.save() | {
-            "task": self.task,
-            "config": to_plain(self.task_cfg),
-            "iter": self.current_learning_iteration,
-            "env": self.env.state_dict(),
-            "logger": self.logger.state_dict(),
-            "torch_random_state": torch.get_rng_state(),
-            "cuda_random_state": torch.cuda.get_rng_state(self.device) if self._on_cuda else None,
-            "infos": infos,
-        }
+        about = self._about(self.current_learning_iteration)
+        payload = (
+            self.alg.save()
+            | about
+            | {
+                "env": self.env.state_dict(),
+                "logger": self.logger.state_dict(),
+                "torch_random_state": torch.get_rng_state(),
+                "cuda_random_state": torch.cuda.get_rng_state(self.device)
+                if self._on_cuda
+                else None,
+                "infos": infos,
+            }
+        )
         save_checkpoint(Path(path), payload)
         self.logger.save_model(path, self.current_learning_iteration)
 
@@ -164,9 +173,24 @@ class MuteRunner(OnPolicyRunner):
     def _on_cuda(self) -> bool:
         return torch.device(self.device).type == "cuda"
 
+    def _measure_noise(self, iteration: int) -> dict[str, float]:
+        """Return the modelled noise levels where the iteration is one that measures them, dBA."""
+        interval = self.task_cfg.agent.noise_interval
+        if not interval or (iteration + 1) % interval:
+            return {}
+        with torch.random.fork_rng(devices=[]):  # networks are born with random weights
+            policy = make_policy(policy_part(self.alg.save() | self._about(iteration)))
+        self._levels = self._noise_probe.measure(policy)
+        return self._levels
+
+    def _about(self, iteration: int) -> dict[str, Any]:
+        """Return what a checkpoint says of its policy."""
+        return {"task": self.task, "config": to_plain(self.task_cfg), "iter": iteration}
+
     def _end_iteration(self, iteration: int, total: int, scalars: dict[str, float]) -> None:
         if self._on_iteration is not None:
-            self._on_iteration(iteration, total, scalars)
+            # Between two trials the display goes on showing the last one's levels.
+            self._on_iteration(iteration, total, self._levels | scalars)
         if self._stop_requested and iteration + 1 < total:
             raise _StopTraining
 

@@ -19,29 +19,21 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from mute.acoustics.contacts import ContactBlock
 from mute.acoustics.drive import DRIVE_BAND, drive_squares
-from mute.acoustics.fan import FAN_LEVEL, fan_squares
+from mute.acoustics.fan import fan_squares
 from mute.acoustics.floors import Floor, find_floors
 from mute.acoustics.impacts import contact_time, floor_modes, pulse_spectrum
-from mute.acoustics.levels import P_REF, LevelDetector, Levels
+from mute.acoustics.levels import LevelDetector, Levels
 from mute.acoustics.microphone import Microphone, distance
 from mute.acoustics.noise import band_a_weight, filter_response
 from mute.acoustics.scuffing import radiated_shares, sliding_squares
 from mute.acoustics.soundscape import SOURCES, StepClock, check_sources, floor_gains
 from mute.acoustics.weighting import a_weighting_db
 
-__all__ = ["EnergyMeter", "impact_exposure", "training_level"]
-
-NOMINAL_MASS = 0.5
-"""Effective mass of a landing foot where none is known, kg: amid the 0.38 to 0.67 that the recorder
-finds in walks of the policy that ships."""
-
-NOMINAL_DISTANCE = 0.5
-"""From the feet to the microphone on the trunk, m (the paper)."""
+__all__ = ["EnergyMeter", "impact_exposure"]
 
 _RATE = 48000
 """Sample rate whose filters are stood in for, Hz."""
@@ -88,37 +80,6 @@ def impact_exposure(mass: NDArray, floor: Floor) -> NDArray[np.float64]:
     return mass**2 * np.interp(np.log(mass), np.log(_TABLE_MASSES), table)
 
 
-def training_level(
-    landing_speed: torch.Tensor,
-    seconds: float,
-    floor: Floor,
-    mass: float = NOMINAL_MASS,
-    distance: float = NOMINAL_DISTANCE,
-    gain: float = 1.0,
-) -> torch.Tensor:
-    """Return the equivalent level of landings and fan at the trunk, for training curves, dB(A).
-
-    Scuffing and drive are left out, so it is below the level of a whole walk.
-
-    L = 10 lg((g^2 E(m) sum v^2 / (r^2 t) + p_fan^2) / p_0^2)
-
-    Args:
-        landing_speed: Normal speeds of all landings in the time, 0 where there was none, m/s.
-            Shape: (..., landings).
-        seconds: The time t, s.
-        floor: What they fell on.
-        mass: Effective mass of all of them, m, kg.
-        distance: From the microphone, r, m.
-        gain: Calibration gain of the floor, g.
-
-    Returns:
-        Modelled level. Shape: (...).
-    """
-    exposure = gain**2 * float(impact_exposure(np.array(mass), floor)) / distance**2
-    landings = exposure / (seconds * P_REF**2) * landing_speed.square().sum(dim=-1)
-    return 10.0 * torch.log10(landings + 10.0 ** (FAN_LEVEL / 10.0))
-
-
 class EnergyMeter:
     """A sound level meter for every robot, without sound."""
 
@@ -145,7 +106,15 @@ class EnergyMeter:
         self._microphone = microphone or Microphone()
         self._floors = find_floors(floors)
         self._gains = floor_gains(floors, gains)
-        self._sources = check_sources(sources)
+        squares = {
+            "impacts": self._landings,
+            "scuffing": self._scuffing,
+            "drive": self._drive,
+            "fan": self._fan,
+        }
+        self._squares = {name: squares[name] for name in check_sources(sources)}
+        self.exposure = {name: np.zeros(num_robots) for name in self._squares}
+        """A-weighted sound exposure of each source so far, Pa^2 s. Shape of each: (num_robots,)."""
         self._clock = StepClock(num_robots)
         bands = [band_a_weight(floor.scuff_band, _RATE) for floor in self._floors]
         self._scuff_weights = radiated_shares(self._floors, self._gains) * bands
@@ -171,7 +140,14 @@ class EnergyMeter:
             self._detector = LevelDetector(rate, self._num_robots)
         chunk = max(1, round(_CHUNK / block.timestep))
         for first in range(0, block.steps, chunk):
-            self._detector.update(self._squares(block.part(first, first + chunk)).T)
+            part = block.part(first, first + chunk)
+            where = self._microphone.position(part)
+            total = np.zeros((part.steps, part.num_robots))
+            for name, squares in self._squares.items():
+                own = squares(part, where)
+                self.exposure[name] += own.sum(axis=0) * block.timestep
+                total += own
+            self._detector.update(total.T)
 
     @property
     def detector(self) -> LevelDetector:
@@ -194,23 +170,18 @@ class EnergyMeter:
         """
         return self.detector.result()
 
-    def _squares(self, block: ContactBlock) -> NDArray[np.float64]:
-        """Return the A-weighted mean square of each step, Pa^2. Shape: (steps, robots)."""
-        where = self._microphone.position(block)
-        squares = np.zeros((block.steps, block.num_robots))
-        if "impacts" in self._sources and len(block.impacts):
-            squares += self._landings(block, where)
-        if "scuffing" in self._sources:
-            heard = sliding_squares(block, where)
-            squares += (self._scuff_weights[block.floor] * heard).sum(axis=2)
-        if "drive" in self._sources:
-            squares += self._drive_weight * drive_squares(block, where)
-        if "fan" in self._sources:
-            squares += fan_squares(block, where)
-        return squares
+    # What follows are A-weighted mean squares by step, Pa^2. Shapes: (steps, robots).
+
+    def _scuffing(self, block: ContactBlock, where: NDArray) -> NDArray:
+        return (self._scuff_weights[block.floor] * sliding_squares(block, where)).sum(axis=2)
+
+    def _drive(self, block: ContactBlock, where: NDArray) -> NDArray:
+        return self._drive_weight * drive_squares(block, where)
+
+    def _fan(self, block: ContactBlock, where: NDArray) -> NDArray:
+        return fan_squares(block, where)
 
     def _landings(self, block: ContactBlock, where: NDArray) -> NDArray:
-        """Return the landings' exposure by step, as mean squares, Pa^2. Shape: (steps, robots)."""
         impacts, step = block.impacts, block.impact_steps()
         apart = distance(impacts.position, where[step, impacts.robot])
         exposure = np.square(impacts.speed * self._gains[impacts.floor] / apart)

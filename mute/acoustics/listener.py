@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from envs.quadruped_env import QuadrupedEnv
 from mute.acoustics.contacts import ContactBlock
 from mute.acoustics.energy import EnergyMeter
-from mute.acoustics.levels import settling_time
+from mute.acoustics.levels import P_REF, settling_time
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.recorder import FloorAt, Recorder
 from mute.acoustics.sound_level_meter import SoundLevelMeter
@@ -54,6 +54,9 @@ class HeardLevels:
     """Largest reading."""
     laeq: float
     """Level of the mean square."""
+    sources: Mapping[str, float]
+    """Level of the mean square of each source that is heard, from `EnergyMeter`; -inf where it is
+    silent."""
 
 
 class Listener:
@@ -110,11 +113,10 @@ class Listener:
         self._robots = robots or slice(None)
         self._count = len(range(env.num_envs)[self._robots])
         self._recorder = Recorder(env, floor_at, robots)
-        self._make_energy_meter = None
-        if from_energies:
-            self._make_energy_meter = lambda: EnergyMeter(
-                self._count, floors, microphone, sources, gains
-            )
+        self._make_energy_meter = lambda: EnergyMeter(
+            self._count, floors, microphone, sources, gains
+        )
+        self._from_energies = from_energies
         self._paths = {0: wav} if isinstance(wav, Path) else dict(wav or {})
         self._files: dict[int, WavFile] = {}
         self._closing = contextlib.ExitStack()
@@ -166,17 +168,18 @@ class Listener:
         """Measure anew, of robots that are about to be reset; sound that is kept goes on."""
         self._work()
         self._recorder.restart(np.ones(self._count, dtype=bool))
+        self._energies = self._make_energy_meter()
         self._meter = (
-            SoundLevelMeter(SAMPLE_RATE, self._count)
-            if self._make_energy_meter is None
-            else self._make_energy_meter()
+            self._energies if self._from_energies else SoundLevelMeter(SAMPLE_RATE, self._count)
         )
         self._steps = 0
         self._age = np.zeros(self._count, dtype=np.int64)
         self._kept = np.zeros((self._count, 0), dtype=bool)
         self._counting = np.zeros(self._count, dtype=bool)
-        # Rows: exposure in the square of the reference pressure times s, and time in s.
-        self._tally, self._tallied = np.zeros((2, self._count)), np.zeros((2, self._count))
+        # Rows: time in s; exposure, in all and of each source, in the square of the reference
+        # pressure times s.
+        self._tally = np.zeros((2 + len(self._energies.exposure), self._count))
+        self._tallied = np.zeros_like(self._tally)
 
     def listen(self, dones: torch.Tensor) -> None:
         """Hear the control step that the environment has just made.
@@ -201,18 +204,8 @@ class Listener:
     def levels(self) -> list[HeardLevels]:
         """Return the figures of each robot, without the last stretch until the listener is left."""
         self._add_up()
-        return [
-            HeardLevels(
-                mnl=float(own.mean()) if len(own) else math.nan,
-                pnl=float(own.max()) if len(own) else math.nan,
-                laeq=_decibels(exposure / seconds) if seconds > 0.0 else math.nan,
-            )
-            for own, exposure, seconds in zip(
-                (row[kept] for row, kept in zip(self._all_readings(), self._kept, strict=True)),
-                *self._tally,
-                strict=True,
-            )
-        ]
+        kept = (row[kept] for row, kept in zip(self._all_readings(), self._kept, strict=True))
+        return [self._figures(own, tally) for own, tally in zip(kept, self._tally.T, strict=True)]
 
     def readings(self) -> NDArray[np.float64]:
         """Return the Fast levels at `reading_times`, dBA; NaN where they are in no figure.
@@ -248,9 +241,8 @@ class Listener:
 
     def _hear(self, block: ContactBlock) -> None:
         pressure = self._render(block)
-        if isinstance(self._meter, EnergyMeter):
-            self._meter.update(block)
-        elif pressure is not None:
+        self._energies.update(block)
+        if isinstance(self._meter, SoundLevelMeter) and pressure is not None:
             self._meter.update(pressure)
         if pressure is not None and self._files:
             begin = min(self._skipped, pressure.shape[1])
@@ -269,9 +261,23 @@ class Listener:
             return
         seconds = np.array([levels.seconds for levels in results])
         exposure = 10.0 ** (0.1 * np.array([levels.laeq for levels in results])) * seconds
-        totals = np.stack((exposure, seconds))
+        sources = [own / P_REF**2 for own in self._energies.exposure.values()]
+        totals = np.stack((seconds, exposure, *sources))
         self._tally += np.where(self._counting, totals - self._tallied, 0.0)
         self._tallied = totals
+
+    def _figures(self, readings: NDArray, tally: NDArray) -> HeardLevels:
+        """Return a robot's figures from its readings that count and its column of the tally."""
+        seconds, *exposures = tally.tolist()
+        laeq, *sources = (
+            _decibels(exposure / seconds) if seconds > 0.0 else math.nan for exposure in exposures
+        )
+        return HeardLevels(
+            mnl=float(readings.mean()) if len(readings) else math.nan,
+            pnl=float(readings.max()) if len(readings) else math.nan,
+            laeq=laeq,
+            sources=dict(zip(self._energies.exposure, sources, strict=True)),
+        )
 
     def _choose_readings(self, ages: NDArray[np.int64]) -> None:
         """Tell which of the new readings count: those in steps of robots that are old enough."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import torch
 from rsl_rl.models import MLPModel
@@ -16,7 +17,7 @@ from mute.config import TaskCfg, from_plain
 from mute.estimated_env import estimate_group
 from networks.estimator import Estimate, Estimator
 
-__all__ = ["LearnedController", "Policy", "load_policy"]
+__all__ = ["LearnedController", "Policy", "load_policy", "make_policy"]
 
 
 @dataclass
@@ -43,17 +44,25 @@ def load_policy(path: Path) -> Policy:
     """
     saved = load_checkpoint(path)
     try:
-        cfg = from_plain(saved["config"])
-        num_heights = cfg.env.height_map.grid().shape[0]
-        estimator = Estimator(OBS_DIM, num_heights, cfg.agent.estimation.network)
-        estimator.load_state_dict(saved["estimator_state_dict"])
-        actor = _actor(cfg, estimator)
-        actor.load_state_dict(saved["actor_state_dict"])
-        policy = Policy(saved["task"], cfg, saved["iter"], estimator.eval(), actor.eval())
+        return make_policy(saved)
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         reason = first_line(error)
         raise CheckpointError(f"{path} holds no policy that fits this version: {reason}") from error
-    return policy
+
+
+def make_policy(saved: dict[str, Any]) -> Policy:
+    """Make a policy of its own, on the CPU, from what `runner.policy_part` returns.
+
+    Raises:
+        KeyError, TypeError, ValueError or RuntimeError: If that is incomplete or does not fit.
+    """
+    cfg = from_plain(saved["config"])
+    num_heights = cfg.env.height_map.grid().shape[0]
+    estimator = Estimator(OBS_DIM, num_heights, cfg.agent.estimation.network)
+    estimator.load_state_dict(saved["estimator_state_dict"])
+    actor = _actor(cfg, estimator)
+    actor.load_state_dict(saved["actor_state_dict"])
+    return Policy(saved["task"], cfg, saved["iter"], estimator.eval(), actor.eval())
 
 
 class LearnedController:

@@ -74,6 +74,14 @@ class NoiseRow:
     """Half width of its 95 % confidence interval, dBA."""
     laeq_mean: float
     """Mean over trials of the equivalent continuous level, dBA."""
+    laeq_impacts: float
+    """The same of the impacts alone, from their energies; NaN if they are not heard."""
+    laeq_scuffing: float
+    """The same of scuffing."""
+    laeq_drive: float
+    """The same of motors and gears."""
+    laeq_fan: float
+    """The same of the fan."""
     speed_mean: float
     """Mean actual forward speed, m/s."""
     velocity_error_sq: float
@@ -107,6 +115,7 @@ def measure_noise(
     wav: Mapping[int, Path] | None = None,
     microphone: Microphone | None = None,
     sources: Sequence[str] = SOURCES,
+    from_energies: bool = False,
     on_step: Callable[[], None] | None = None,
     on_clipped: Callable[[Path, int], None] | None = None,
 ) -> list[NoiseRow]:
@@ -126,6 +135,8 @@ def measure_noise(
             after `SETTLE_TIME`.
         microphone: Where to listen. Default: on the trunk.
         sources: What to hear, of `soundscape.SOURCES`.
+        from_energies: Take the levels from energies, without sound that no file wants: quicker, see
+            `mute.acoustics.energy`.
         on_step: Called after each control step, of which there are `(seconds + SETTLE_TIME) /
             step_dt`.
         on_clipped: Called with each file that has samples beyond full scale, and their number.
@@ -142,7 +153,17 @@ def measure_noise(
         chosen = slice(index * trials, (index + 1) * trials)
         commands[chosen, 0], commands[chosen, 3] = setting.command_speed, setting.beta
     files = {index * trials: path for index, path in (wav or {}).items()}
-    listener = Listener(env, [surface], 0, microphone, gains, sources, SETTLE_TIME, seed, files)
+    listener = Listener(
+        env,
+        [surface],
+        microphone=microphone,
+        gains=gains,
+        sources=sources,
+        settle_time=SETTLE_TIME,
+        seed=seed,
+        wav=files,
+        from_energies=from_energies,
+    )
 
     def hear(_: object, dones: torch.Tensor) -> None:
         listener.listen(dones)
@@ -201,6 +222,10 @@ def _row(
         pnl_std=pnl_std,
         pnl_ci95=pnl_ci95,
         laeq_mean=float(np.mean([trial.laeq for trial in levels])),
+        **{
+            f"laeq_{name}": float(np.mean([trial.sources.get(name, np.nan) for trial in levels]))
+            for name in SOURCES
+        },
         speed_mean=gait.speed,
         cost_of_transport=gait.power / (weight * gait.speed) if gait.speed > 0.0 else float("nan"),
         **shared,

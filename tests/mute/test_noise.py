@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 
 import pytest
+import torch
 from scipy import stats
 
 from mute.acoustics import listener
 from mute.acoustics.calibration import fit_gain
+from mute.acoustics.fan import FAN_LEVEL
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
 from mute.acoustics.microphone import Microphone
+from mute.acoustics.soundscape import SOURCES
 from mute.command_lines.arguments import REPOSITORY
 from mute.controllers import load_policy
 from mute.errors import MuteError
 from mute.evaluation.noise import NoiseRow, NoiseSetting, measure_noise
+from mute.evaluation.noise_probe import NoiseProbe
 
 
 def _measure(seed: int, trials: int = 5, seconds: float = 3.0, **options) -> list[NoiseRow]:
@@ -56,6 +61,37 @@ def test_every_control_step_is_told_and_a_source_can_be_heard_alone_from_afar():
     assert len(steps) == 100  # a second to settle, and one that is measured
     assert all(row.mnl_mean < 55.0 - 6.0 for row in rows)
     assert rows[0].pnl_mean - rows[0].mnl_mean < 1.5
+
+
+def test_the_levels_of_the_sources_add_up_to_the_whole(rows):
+    for row in rows:
+        own = [getattr(row, f"laeq_{name}") for name in SOURCES]
+        total = 10.0 * math.log10(sum(10.0 ** (0.1 * level) for level in own))
+        assert total == pytest.approx(row.laeq_mean, abs=0.5)
+        assert row.laeq_fan == pytest.approx(FAN_LEVEL, abs=0.5)
+    loud, quiet = rows
+    assert loud.laeq_impacts - quiet.laeq_impacts > 4.0
+
+
+def test_a_source_that_is_not_heard_has_no_level():
+    (row,) = _measure(seed=1, trials=1, seconds=0.5, sources=("drive",), from_energies=True)[:1]
+    assert math.isnan(row.laeq_impacts)
+    assert row.laeq_drive == pytest.approx(row.laeq_mean, abs=1e-6)
+
+
+def test_a_probe_of_a_training_is_near_the_table_and_draws_no_random_number(rows):
+    policy = load_policy(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
+    before = torch.get_rng_state()
+    levels = NoiseProbe().measure(policy)
+    assert torch.equal(torch.get_rng_state(), before)
+    expected = {f"Noise/level_beta_{row.beta:g}": row.mnl_mean for row in rows}
+    assert levels == pytest.approx(expected, abs=1.0)
+
+
+def test_a_policy_that_acts_between_the_physics_steps_has_no_level():
+    policy = load_policy(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
+    policy.cfg.env.scene = dataclasses.replace(policy.cfg.env.scene, timestep=0.0051)
+    assert NoiseProbe().measure(policy) == {}
 
 
 def test_clipped_samples_are_told_with_their_file(tmp_path, monkeypatch):

@@ -80,6 +80,7 @@ def finished(tmp_path_factory) -> tuple[Path, subprocess.CompletedProcess[str]]:
     command += ["--iterations", "3", "--seed", "5", "--log-dir", str(log_dir), "--run-name", "a"]
     command += ["--env.rewards.k", "0.3", "--agent.estimation.network.lstm-hidden", "24"]
     command += ["--env.rewards.quiet-ramp", "0.0", "1.0", "--agent.save-interval", "2"]
+    command += ["--agent.noise-interval", "2"]
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     result = subprocess.run(
         command, cwd=REPO, env=environment, capture_output=True, text=True, timeout=180
@@ -119,6 +120,7 @@ def test_options_arrive_in_the_written_parameters_from_which_the_run_is_re_made(
     expected.env.num_envs, expected.env.seed = 32, 5
     expected.env.rewards.k, expected.env.rewards.quiet_ramp = 0.3, (0.0, 1.0)
     expected.agent.iterations, expected.agent.save_interval = 3, 2
+    expected.agent.noise_interval = 2
     expected.agent.estimation.network.lstm_hidden = 24
     assert from_plain({name: written[name] for name in ("env", "agent")}) == expected
     assert from_plain(load_checkpoint(run / "model_2.pt")["config"]) == expected
@@ -136,8 +138,8 @@ def test_tensorboard_has_every_reward_term_loss_estimator_error_and_landing_spee
         "Gait/velocity_error_sq",
         "Gait/landing_speed_low_beta",
         "Gait/landing_speed_high_beta",
-        "Noise/landing_level_low_beta",
-        "Noise/landing_level_high_beta",
+        "Noise/level_beta_0",
+        "Noise/level_beta_1",
         "Perf/total_fps",
         "Curriculum/quiet",
     }

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-import torch
 from sound_helpers import FEET, FLOORS, a_weighted_level, make_block, random_walk
 
-from mute.acoustics.energy import EnergyMeter, impact_exposure, training_level
+from mute.acoustics.contacts import ContactBlock
+from mute.acoustics.energy import EnergyMeter, impact_exposure
 from mute.acoustics.floors import FLOORS as FLOOR_TABLE
+from mute.acoustics.levels import P_REF
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.sound_level_meter import SoundLevelMeter
 from mute.acoustics.soundscape import SOURCES, Soundscape
@@ -88,24 +89,21 @@ def test_steps_that_do_not_fill_a_second_are_refused():
         EnergyMeter(1, FLOORS).update(make_block(10, timestep=0.003))
 
 
-def test_the_training_level_of_no_landings_is_the_fan():
-    level = training_level(torch.zeros(3, 4), 10.0, FLOOR_TABLE["wood"])
-    torch.testing.assert_close(level, torch.full((3,), 55.0))
+def test_the_exposures_of_the_sources_add_up_to_the_level():
+    steps = 10000
+    block = make_block(steps, landings=[(100 * k, 0, 0, 1.2, 0.5) for k in range(100)])
+    meter = EnergyMeter(1, FLOORS)
+    meter.update(block.part(0, 3000))
+    meter.update(block.part(3000, steps))
+    seconds = steps * block.timestep
+    total = sum(float(own[0]) for own in meter.exposure.values()) / seconds
+    assert 10.0 * np.log10(total / P_REF**2) == pytest.approx(meter.result()[0].laeq, abs=1e-6)
+    assert meter.exposure["impacts"][0] == pytest.approx(
+        100 * _alone("impacts", make_block(100, landings=[(0, 0, 0, 1.2, 0.5)])), rel=1e-6
+    )
 
 
-def test_the_training_level_is_the_laeq_of_the_meter():
-    seconds, mass, speed = 10.0, 0.5, 1.2
-    landings = [(100 * k, 0, 0, speed, mass) for k in range(100)]
-    microphone = Microphone((FEET[0, 0], FEET[0, 1], 0.5), "world")
-    meter = EnergyMeter(1, FLOORS, microphone, ("impacts",))
-    meter.update(make_block(10000, landings=landings))
-    landed = meter.result()[0].laeq
-    expected = 10.0 * np.log10(10.0 ** (landed / 10.0) + 10.0**5.5)
-    level = training_level(torch.full((100,), speed), seconds, FLOOR_TABLE["wood"], mass)
-    assert float(level) == pytest.approx(expected, abs=1e-3)
-
-
-def test_landings_far_above_the_fan_follow_the_speed_by_6_02_db():
-    speeds = torch.tensor([[100.0, 0.0], [200.0, 0.0]], dtype=torch.float64)
-    slow, fast = training_level(speeds, 1.0, FLOOR_TABLE["tile"])
-    assert float(fast - slow) == pytest.approx(6.0206, abs=1e-3)
+def _alone(source: str, block: ContactBlock) -> float:
+    meter = EnergyMeter(1, FLOORS, sources=(source,))
+    meter.update(block)
+    return float(meter.exposure[source][0])
