@@ -7,13 +7,15 @@ sound changes no figure. Tables of many trials are `mute.evaluation`'s.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
 from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
 from mute.acoustics.levels import READINGS_PER_SECOND
 from mute.acoustics.listener import Listener
+from mute.acoustics.microphone import Microphone
+from mute.acoustics.soundscape import SOURCES
 from mute.evaluation.listening import listening_cfg
 
 __all__ = ["Ear", "audible_cfg"]
@@ -41,7 +43,7 @@ def audible_cfg(cfg: QuadrupedEnvCfg, surface: str | None) -> QuadrupedEnvCfg:
 
 
 class Ear:
-    """Hears the first robot of an environment at the microphone on its trunk.
+    """Hears the first robot of an environment.
 
     A context manager: the file of the sound is whole however the walk ends. Memory grows by the
     readings of the level alone, some 200 bytes a second.
@@ -55,6 +57,8 @@ class Ear:
         settle_time: float = 1.0,
         seed: int = 0,
         wav: Path | None = None,
+        microphone: Microphone | None = None,
+        sources: Sequence[str] = SOURCES,
     ) -> None:
         """Begin to listen.
 
@@ -65,9 +69,11 @@ class Ear:
             settle_time: Time that `levels` leaves out, at the start and after each fall, s.
             seed: Of the noise in the sound.
             wav: File for the sound from the first step on, as a film has it; it begins on entering.
+            microphone: Where to listen. Default: on the trunk.
+            sources: What to hear, of `soundscape.SOURCES`.
 
         Raises:
-            ValueError: If the floor is not known, or the environment measures no forces.
+            ValueError: If floor or source is not known, or the environment measures no forces.
         """
         self.surface = surface
         self.wav = wav
@@ -75,7 +81,9 @@ class Ear:
         self._listener = Listener(
             env,
             [surface],
+            microphone=microphone,
             gains=gains,
+            sources=sources,
             settle_time=settle_time,
             seed=seed,
             wav=wav,

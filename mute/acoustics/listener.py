@@ -107,8 +107,8 @@ class Listener:
             ValueError: If a floor, a source or a gain is not allowed, or the environment does not
                 measure what is needed.
         """
-        self.clipped: dict[Path, int] = {}
-        """Samples beyond full scale in each file, once it is complete."""
+        self.clipped: dict[int, int] = {}
+        """Samples beyond full scale in each robot's file, once it is complete."""
         self._env = env
         self._robots = robots or slice(None)
         self._count = len(range(env.num_envs)[self._robots])
@@ -290,7 +290,7 @@ class Listener:
     def _close_file(self, robot: int) -> None:
         file = self._files.pop(robot)
         file.close()
-        self.clipped[file.path] = file.clipped
+        self.clipped[robot] = file.clipped
 
 
 class WavFile:

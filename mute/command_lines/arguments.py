@@ -183,6 +183,16 @@ def check_wav(path: Path | None) -> None:
         raise MuteError(f"--wav must name a .wav file, got {str(path)!r}")
 
 
+def check_video(path: Path | None) -> None:
+    """Check --video.
+
+    Raises:
+        MuteError: If it names a file of another kind.
+    """
+    if path is not None and path.suffix.lower() != ".mp4":
+        raise MuteError(f"--video must name an .mp4 file, got {str(path)!r}")
+
+
 def make_directory(path: Path) -> None:
     """Make the directory of --out, before any work whose figures could not be kept.
 

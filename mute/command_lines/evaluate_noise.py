@@ -22,6 +22,7 @@ from mute.command_lines.arguments import (
     check_distinct,
     check_seed,
     check_trials,
+    check_video,
     check_wav,
     make_directory,
 )
@@ -30,10 +31,11 @@ from mute.command_lines.sound_options import (
     find_microphone,
     load_audible_policy,
     progress_bar,
-    tell_clipped,
+    tell,
 )
 from mute.errors import MuteError
 from mute.evaluation.noise import SETTLE_TIME, NoiseRow, NoiseSetting, measure_noise
+from mute.evaluation.recordings import Recordings
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.provenance import machine_kind
 from mute.tasks import DEFAULT_TASK
@@ -79,6 +81,8 @@ class NoiseArgs(_CommonArgs):
     wav: Path | None = None
     """Keep the sound of first trials: in FILE.wav where there is one floor and one beta, else in
     FILE-<surface>-beta<beta>.wav."""
+    video: Path | None = None
+    """Film first trials, with that sound, to FILE.mp4, or to files named likewise."""
 
 
 @dataclass
@@ -94,6 +98,8 @@ class SweepSpeedArgs(_CommonArgs):
     wav: Path | None = None
     """Keep the sound of first trials: in FILE.wav where there is one speed and one beta, else in
     FILE-speed<speed>-beta<beta>.wav."""
+    video: Path | None = None
+    """Film first trials, with that sound, to FILE.mp4, or to files named likewise."""
 
 
 @dataclass
@@ -109,6 +115,8 @@ class SweepBetaArgs(_CommonArgs):
     wav: Path | None = None
     """Keep the sound of first trials: in FILE.wav where there is one beta, else in
     FILE-speed<speed>-beta<beta>.wav."""
+    video: Path | None = None
+    """Film first trials, with that sound, to FILE.mp4, or to files named likewise."""
 
 
 def noise(args: NoiseArgs) -> None:
@@ -165,8 +173,13 @@ def _run(
     """
     _check(args, surfaces, args.beta, speeds)
     check_wav(args.wav)
+    check_video(args.video)
     settings = [NoiseSetting(beta, speed) for beta in args.beta for speed in speeds]
-    rows = _measure(name, args, surfaces, settings, _wav_files(args.wav, labels))
+    kept = [
+        Recordings(wav, video, tell)
+        for wav, video in zip(_files(args.wav, labels), _files(args.video, labels), strict=True)
+    ]
+    rows = _measure(name, args, surfaces, settings, kept)
     _report(name, args, rows, draw)
 
 
@@ -175,7 +188,7 @@ def _measure(
     args: _CommonArgs,
     surfaces: Sequence[str],
     settings: Sequence[NoiseSetting],
-    files: Sequence[dict[int, Path]],
+    kept: Sequence[Recordings],
 ) -> list[NoiseRow]:
     """Return the rows of every setting on every floor.
 
@@ -184,7 +197,7 @@ def _measure(
         args: Its arguments.
         surfaces: Names of the floors.
         settings: What is asked for on each.
-        files: For each floor the files for the sound of settings, by their index.
+        kept: For each floor what to keep of settings, by their index.
     """
     policy, gains = load_audible_policy(args.policy), load_gains()
     microphone = find_microphone(args.microphone)
@@ -194,7 +207,7 @@ def _measure(
     rows: list[NoiseRow] = []
     done = itertools.count(1)
     with progress_bar(name, len(surfaces) * steps) as advance:
-        for surface, wav in zip(surfaces, files, strict=True):
+        for surface, keep in zip(surfaces, kept, strict=True):
             rows += measure_noise(
                 policy,
                 surface,
@@ -203,17 +216,16 @@ def _measure(
                 args.seconds,
                 args.seed,
                 gains,
-                wav,
+                keep,
                 on_step=lambda: advance(next(done)),
                 microphone=microphone,
                 sources=args.sources,
-                on_clipped=tell_clipped,
             )
     return rows
 
 
-def _wav_files(path: Path | None, labels: Sequence[Sequence[str]]) -> list[dict[int, Path]]:
-    """Return the files for the sound of each floor's settings, by their index.
+def _files(path: Path | None, labels: Sequence[Sequence[str]]) -> list[dict[int, Path]]:
+    """Return the files for each floor's settings, by their index.
 
     Args:
         path: What was asked for.

@@ -8,27 +8,28 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
-
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from envs.quadruped_env import QuadrupedEnv
 from envs.scene import Look, SceneError
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
+from mute.acoustics.soundscape import SOURCES
 from mute.checkpoint import latest_checkpoint
 from mute.command_lines.arguments import (
     REPOSITORY,
+    Words,
     check_seed,
+    check_video,
     check_wav,
     command_line,
     parse,
 )
 from mute.command_lines.play_figures import live_captions, report, summary
+from mute.command_lines.sound_options import check_sources, find_microphone, progress_bar
 from mute.controllers import LearnedController, load_policy
 from mute.controllers.learned import Policy
 from mute.errors import EXIT_INTERRUPTED, MuteError
@@ -36,6 +37,7 @@ from mute.evaluation.trials import evaluation_cfg
 from mute.hearing import Ear, audible_cfg
 from mute.rendering.backend import has_display, why_no_window
 from mute.rendering.keys import KEYS_HELP
+from mute.rendering.sound_track import temporary_sound
 from mute.rendering.video import Video
 from mute.session import COMMAND_LIMITS, Command, Session
 from mute.tasks import DEFAULT_TASK, make_task
@@ -85,6 +87,11 @@ class PlayArgs:
     """Floor to walk on and to hear, with physics at 1 ms: wood, carpet, tile or concrete. Unless
     given, training's floor and physics, with a level (modelled, sounding as wood); with --wav or
     --video, wood."""
+    sources: Words = SOURCES
+    """What to hear: impacts, scuffing, drive, fan."""
+    microphone: str = "trunk"
+    """Where to listen: trunk, or X,Y,Z of a listener who walks along, m forward, left, and up from
+    the ground under the robot: 0,1,1.2."""
     wav: Path | None = None
     """Keep the modelled sound of the first robot in this .wav file."""
     video: Path | None = None
@@ -112,8 +119,9 @@ class PlayArgs:
             allowed = ", ".join(FLOORS)
             raise MuteError(f"--surface must be one of {allowed}, got {self.surface!r}")
         check_wav(self.wav)
-        if self.video and self.video.suffix.lower() != ".mp4":
-            raise MuteError(f"--video must name an .mp4 file, got {str(self.video)!r}")
+        check_video(self.video)
+        check_sources(self.sources)
+        find_microphone(self.microphone)
         if self.video and self.viewer == "native":
             raise MuteError("--video films without a window, so not with --viewer native")
 
@@ -132,7 +140,7 @@ class PlayArgs:
         """File for the sound; that of a video alone is beside it, until it is put in."""
         if self.wav or not self.video:
             return self.wav
-        return self.video.with_name(f"{self.video.stem}.{os.getpid()}.tmp.wav")
+        return temporary_sound(self.video)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -238,7 +246,16 @@ def _make_ear(args: PlayArgs, env: QuadrupedEnv, settle_time: float) -> Ear | No
     if not env.cfg.scene.foot_forces:
         return None
     surface = args.floor or _SURFACE
-    return Ear(env, surface, load_gains(), settle_time, args.seed, args.sound)
+    return Ear(
+        env,
+        surface,
+        load_gains(),
+        settle_time,
+        args.seed,
+        args.sound,
+        find_microphone(args.microphone),
+        args.sources,
+    )
 
 
 def _policy_path(args: PlayArgs) -> Path:
@@ -305,27 +322,17 @@ def _walk_in_text(
     per_second = round(1.0 / session.env.step_dt)
     show_bar = on_step is not None and not args.json and sys.stderr.isatty()
     heard = session.ear or contextlib.nullcontext()
-    with heard, _progress(num_steps, show_bar) as advance:
-        for _ in range(num_steps):
+    bar = progress_bar("filming", num_steps) if show_bar else contextlib.nullcontext()
+    with heard, bar as advance:
+        for step in range(num_steps):
             session.step()
             if on_step is not None:
                 on_step()
-            advance()
+            if advance is not None:
+                advance(step + 1)
             if session.steps % per_second == 0 and not (show_bar or args.json):
                 figures = [f"{k} {v}" for k, v in live_captions(session).items()]
                 print(f"{session.seconds:5.1f} s", *figures, sep=" | ", flush=True)
-
-
-@contextlib.contextmanager
-def _progress(total: int, shown: bool) -> Iterator[Callable[[], None]]:
-    """Show a progress bar on standard error, if wanted; yields what advances it."""
-    if not shown:
-        yield lambda: None
-        return
-    columns = (TextColumn("filming"), BarColumn(), TextColumn("left"), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True)) as progress:
-        task = progress.add_task("filming", total=total)
-        yield lambda: progress.advance(task)
 
 
 def _print_header(args: PlayArgs, policy: Policy) -> None:

@@ -23,7 +23,7 @@ __all__ = [
     "find_microphone",
     "load_audible_policy",
     "progress_bar",
-    "tell_clipped",
+    "tell",
 ]
 
 _FARTHEST = 100.0
@@ -96,6 +96,6 @@ def progress_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
         yield lambda done: progress.update(task, completed=done)
 
 
-def tell_clipped(path: Path, samples: int) -> None:
-    """Print on standard error how many samples of a file are clipped."""
-    print(f"{path}: {samples} samples are clipped", file=sys.stderr)
+def tell(note: str) -> None:
+    """Print a line on standard error."""
+    print(note, file=sys.stderr)

@@ -16,6 +16,7 @@ from mute.command_lines.arguments import (
     Words,
     check_betas,
     check_seed,
+    check_video,
     check_wav,
     make_directory,
 )
@@ -24,10 +25,11 @@ from mute.command_lines.sound_options import (
     find_microphone,
     load_audible_policy,
     progress_bar,
-    tell_clipped,
+    tell,
 )
 from mute.controllers import LearnedController
 from mute.evaluation.course import Course, load_course
+from mute.evaluation.recordings import Recordings
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.walk import Walk, follow_course, make_walk_env
 from mute.provenance import machine_kind
@@ -60,6 +62,8 @@ class WalkArgs:
     """Directory of the files that are written."""
     wav: Path | None = None
     """Keep the sound at the microphone in this .wav file."""
+    video: Path | None = None
+    """Film the walk, with that sound, to this .mp4 file."""
 
 
 def walk(args: WalkArgs) -> None:
@@ -72,6 +76,7 @@ def walk(args: WalkArgs) -> None:
     check_seed(args.seed)
     check_sources(args.sources)
     check_wav(args.wav)
+    check_video(args.video)
     microphone = find_microphone(args.microphone)
     course, policy = load_course(args.course), load_audible_policy(args.policy)
     gains = load_gains()
@@ -87,15 +92,19 @@ def walk(args: WalkArgs) -> None:
             gains,
             args.seed,
             args.hold_speed,
-            args.wav,
+            _recordings(args),
             advance,
             microphone=microphone,
             sources=args.sources,
-            on_clipped=tell_clipped,
         )
     print(_story(result, course))
     files = _write(args, course, result, policy.iteration)
     print(f"written to {args.out}: {', '.join(files)}")
+
+
+def _recordings(args: WalkArgs) -> Recordings:
+    wav = {0: args.wav} if args.wav else {}
+    return Recordings(wav, {0: args.video} if args.video else {}, tell)
 
 
 def _write(args: WalkArgs, course: Course, result: Walk, iteration: int) -> list[str]:

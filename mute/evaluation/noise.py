@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -21,6 +20,7 @@ from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
 from mute.evaluation.gait import Gait
 from mute.evaluation.listening import make_listening_env
+from mute.evaluation.recordings import Recordings, filming
 from mute.evaluation.trials import evaluation_cfg, run_trial
 
 __all__ = [
@@ -28,7 +28,6 @@ __all__ = [
     "NoiseRow",
     "NoiseSetting",
     "measure_noise",
-    "report_clipped",
     "robot_weight",
 ]
 
@@ -112,12 +111,11 @@ def measure_noise(
     seconds: float,
     seed: int,
     gains: Mapping[str, float],
-    wav: Mapping[int, Path] | None = None,
+    keep: Recordings | None = None,
     microphone: Microphone | None = None,
     sources: Sequence[str] = SOURCES,
     from_energies: bool = False,
     on_step: Callable[[], None] | None = None,
-    on_clipped: Callable[[Path, int], None] | None = None,
 ) -> list[NoiseRow]:
     """Walk straight ahead on a floor and return each setting's figures.
 
@@ -131,18 +129,17 @@ def measure_noise(
         seconds: Measured length of a trial, after `SETTLE_TIME`, s.
         seed: Seed of initial states and of the noise.
         gains: Calibration gain of each floor.
-        wav: Files for the sound of each setting's first trial, by the setting's index; they begin
-            after `SETTLE_TIME`.
+        keep: What to keep of each setting's first trial, by the setting's index, from
+            `SETTLE_TIME` on.
         microphone: Where to listen. Default: on the trunk.
         sources: What to hear, of `soundscape.SOURCES`.
         from_energies: Take the levels from energies, without sound that no file wants: quicker, see
             `mute.acoustics.energy`.
         on_step: Called after each control step, of which there are `(seconds + SETTLE_TIME) /
             step_dt`.
-        on_clipped: Called with each file that has samples beyond full scale, and their number.
 
     Raises:
-        MuteError: If a file cannot be written.
+        MuteError: If a file cannot be written, or nothing renders.
         ValueError: If the floor or a source is not known.
     """
     robots = len(settings) * trials
@@ -152,28 +149,31 @@ def measure_noise(
     for index, setting in enumerate(settings):
         chosen = slice(index * trials, (index + 1) * trials)
         commands[chosen, 0], commands[chosen, 3] = setting.command_speed, setting.beta
-    files = {index * trials: path for index, path in (wav or {}).items()}
-    listener = Listener(
-        env,
-        [surface],
-        microphone=microphone,
-        gains=gains,
-        sources=sources,
-        settle_time=SETTLE_TIME,
-        seed=seed,
-        wav=files,
-        from_energies=from_energies,
-    )
-
-    def hear(_: object, dones: torch.Tensor) -> None:
-        listener.listen(dones)
-        if on_step is not None:
-            on_step()
-
+    kept = (keep or Recordings()).spaced(trials)
     steps = round((seconds + SETTLE_TIME) / env.step_dt)
-    with listener:
+    with (
+        filming(env, kept, SETTLE_TIME) as films,
+        Listener(
+            env,
+            [surface],
+            microphone=microphone,
+            gains=gains,
+            sources=sources,
+            settle_time=SETTLE_TIME,
+            seed=seed,
+            wav=films.sounds,
+            from_energies=from_energies,
+        ) as listener,
+    ):
+
+        def hear(_: object, dones: torch.Tensor) -> None:
+            listener.listen(dones)
+            films.record()
+            if on_step is not None:
+                on_step()
+
         meter = run_trial(env, LearnedController(policy, robots), commands, steps, hear)
-    report_clipped(listener, on_clipped)
+    kept.note_clipped(listener.clipped)
     levels = listener.levels()
     weight = robot_weight(env)
     rows = []
@@ -183,13 +183,6 @@ def measure_noise(
         own = levels[index * trials : (index + 1) * trials]
         rows.append(_row(policy.task, surface, setting, meter.gait(chosen), own, weight))
     return rows
-
-
-def report_clipped(listener: Listener, on_clipped: Callable[[Path, int], None] | None) -> None:
-    """Tell of each file of a listener that has samples beyond full scale."""
-    for path, samples in listener.clipped.items():
-        if samples and on_clipped is not None:
-            on_clipped(path, samples)
 
 
 def robot_weight(env: QuadrupedEnv) -> float:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -27,8 +26,9 @@ from mute.controllers.controller import Controller
 from mute.evaluation.course import Course
 from mute.evaluation.gait import Gait
 from mute.evaluation.listening import listening_cfg
-from mute.evaluation.noise import report_clipped
+from mute.evaluation.noise import SETTLE_TIME
 from mute.evaluation.path_following import PathFollower, SpeedHold
+from mute.evaluation.recordings import Recordings, filming
 from mute.evaluation.trials import evaluation_cfg
 from mute.session import Command, Session
 
@@ -163,11 +163,10 @@ def follow_course(
     gains: Mapping[str, float] | None = None,
     seed: int = 0,
     hold_speed: bool = False,
-    wav: Path | None = None,
+    keep: Recordings | None = None,
     on_progress: Callable[[float], None] | None = None,
     microphone: Microphone | None = None,
     sources: Sequence[str] = SOURCES,
-    on_clipped: Callable[[Path, int], None] | None = None,
 ) -> Walk:
     """Walk a course from its start to its end, to a fall, or to the time limit.
 
@@ -182,34 +181,37 @@ def follow_course(
         seed: Seed of all noise in the sound.
         hold_speed: Ask for more where the robot falls behind the course's speed; otherwise the
             commands are never above it, whatever becomes of them.
-        wav: File for the sound; it begins once the robot has settled.
+        keep: What to keep of the robot, of index 0, from `SETTLE_TIME` on.
         on_progress: Called before every step with the length of the path left behind, m.
         microphone: Where to listen. Default: on the trunk.
         sources: What to hear, of `soundscape.SOURCES`.
-        on_clipped: Called with the file and the number of its samples beyond full scale, if any.
 
     Raises:
-        MuteError: If the WAV file cannot be written.
+        MuteError: If a file cannot be written, or nothing renders.
     """
     env.autoreset = False  # a fall ends the walk, and leaves the robot where it fell
     follower = PathFollower(course.path, course.speed)
     hold = SpeedHold(env.step_dt)
     session = Session(env, controller, Command(vx=0.0, beta=beta))
-    listener = Listener(
-        env,
-        course.floor_names,
-        course.floor_at,
-        microphone,
-        gains,
-        sources,
-        seed=seed,
-        wav=wav,
-        from_energies=True,
-    )
     places = [_place(env)]
     deviation, commanded = 0.0, 0.0
     end: End = "time limit"
-    with listener:
+    kept = keep or Recordings()
+    with (
+        filming(env, kept, SETTLE_TIME) as films,
+        Listener(
+            env,
+            course.floor_names,
+            course.floor_at,
+            microphone,
+            gains,
+            sources,
+            settle_time=SETTLE_TIME,
+            seed=seed,
+            wav=films.sounds,
+            from_energies=True,
+        ) as listener,
+    ):
         for _ in range(round(time_limit(course) / env.step_dt)):
             vx, vy, wz = follower.command(*places[-1])
             if on_progress is not None:
@@ -225,11 +227,12 @@ def follow_course(
             session.step()
             dones = env.fallen | env.unstable
             listener.listen(dones)
+            films.record()
             if bool(dones[0]):
                 end = "fell"
                 break
             places.append(_place(env))
-    report_clipped(listener, on_clipped)
+    kept.note_clipped(listener.clipped)
     xy = np.array(places)[:, :2]
     track = _track(listener, course, xy, env.step_dt)
     distance = _distance(xy, env.step_dt)

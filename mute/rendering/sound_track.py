@@ -10,7 +10,7 @@ import imageio_ffmpeg
 
 from mute.errors import MuteError
 
-__all__ = ["add_sound"]
+__all__ = ["add_sound", "temporary_sound"]
 
 _BITRATE = "128k"
 """Of the AAC sound, bit/s: for one channel, beyond what is heard."""
@@ -50,6 +50,11 @@ def add_sound(film: Path, sound: Path) -> None:
         raise MuteError(_last_line(str(error))) from error
     finally:
         heard.unlink(missing_ok=True)
+
+
+def temporary_sound(film: Path) -> Path:
+    """Return where the sound of a film can grow until it is put in, beside the film."""
+    return film.with_name(f"{film.stem}.{os.getpid()}.tmp.wav")
 
 
 def _last_line(text: str) -> str:

@@ -7,6 +7,7 @@ so is the sound: a WAV file that `sound_track` puts in at the end.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import sys
 from pathlib import Path
@@ -27,24 +28,35 @@ _WIDTH, _HEIGHT = 1280, 720
 _SOFTWARE_RATE = 25.0
 """Most pictures a second where the processor renders; each costs it over 0.1 s."""
 _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "software")
+_AZIMUTH = 125.0
+"""Of the camera from the way that the robot faces at first, degrees."""
 _LOOK_AT_HEIGHT = 0.2
 """Height of the point that the camera looks at, m: the trunk's bobbing stays to be seen."""
 
 
 class Video:
-    """A video file of robot 0 of an environment; a context manager.
+    """A video file of one robot of an environment; a context manager.
 
     The file gets its name when it is complete. Leaving by Ctrl-C completes it with what there is;
     leaving by another exception removes it.
     """
 
-    def __init__(self, path: Path, env: QuadrupedEnv, sound: Path | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        env: QuadrupedEnv,
+        sound: Path | None = None,
+        robot: int = 0,
+        start: float = 0.0,
+    ) -> None:
         """Prepare to render and make the file's directory; the file itself begins on entering.
 
         Args:
             path: The file, its name ending in .mp4; an old one is replaced at the end.
             env: The environment to look at.
             sound: WAV file of the same walk, complete before the video is.
+            robot: Index of the robot to follow.
+            start: Time after which the film begins, s.
 
         Raises:
             MuteError: If the path cannot be a video, or nothing renders.
@@ -54,8 +66,10 @@ class Video:
         """Why the sound is not in the complete file, in one line."""
         self._env = env
         self._sound = sound
+        self._robot = robot
         self._temporary = _temporary_name(path)
-        self._steps = 0
+        self._steps = -round(start / env.step_dt)
+        self._pictures = 0
         self._renderer, software = _make_renderer(env.model)
         rate = min(_SOFTWARE_RATE, 1.0 / env.step_dt) if software else 1.0 / env.step_dt
         self._stride = max(1, round(1.0 / (rate * env.step_dt)))
@@ -63,10 +77,10 @@ class Video:
         """Pictures a second: one a control step, fewer where the processor has to render."""
         self._data = mujoco.MjData(env.model)
         self._camera = mujoco.MjvCamera()
-        self._camera.azimuth, self._camera.elevation, self._camera.distance = 125.0, -14.0, 1.5
+        self._camera.elevation, self._camera.distance = -14.0, 1.5
 
     def __enter__(self) -> Video:
-        """Begin the file with a picture of the present."""
+        """Open the file; without a later start, it begins with a picture of the present."""
         self._writer: Any = imageio.get_writer(
             self._temporary,
             fps=self.frame_rate,
@@ -77,7 +91,8 @@ class Video:
             ffmpeg_log_level="error",
         )
         try:
-            self._append()
+            if self._steps == 0:
+                self._append()
         except BaseException as error:
             self.__exit__(type(error), error, error.__traceback__)
             raise
@@ -95,7 +110,7 @@ class Video:
             MuteError: If the file cannot be completed.
         """
         self._renderer.close()
-        if exc_type is None or issubclass(exc_type, KeyboardInterrupt):
+        if self._pictures and (exc_type is None or issubclass(exc_type, KeyboardInterrupt)):
             try:
                 self._complete()
             except OSError as error:
@@ -111,7 +126,7 @@ class Video:
             MuteError: If the file cannot be written.
         """
         self._steps += 1
-        if self._steps % self._stride == 0:
+        if self._steps >= 0 and self._steps % self._stride == 0:
             self._append()
 
     def _complete(self) -> None:
@@ -130,12 +145,16 @@ class Video:
             self._writer.append_data(self._picture())
         except OSError as error:
             raise _cannot_write(self.path, error) from error
+        self._pictures += 1
 
     def _picture(self) -> np.ndarray:
-        """Return robot 0 as it stands now. Shape: (height, width, 3), uint8."""
+        """Return the robot as it stands now. Shape: (height, width, 3), uint8."""
         simulation, data = self._env.simulation, self._data
-        data.qpos[:] = simulation.qpos[0].numpy()
+        data.qpos[:] = simulation.qpos[self._robot].numpy()
         mujoco.mj_forward(self._env.model, data)
+        if not self._pictures:  # the view of a walk is the same whatever way it begins
+            forward = self._env.heading[self._robot]
+            self._camera.azimuth = _AZIMUTH + math.degrees(math.atan2(forward[1], forward[0]))
         self._camera.lookat[:] = (*data.qpos[:2], _LOOK_AT_HEIGHT)
         self._renderer.update_scene(data, self._camera)
         return self._renderer.render()

@@ -43,8 +43,8 @@ def asked(monkeypatch) -> list[dict[str, Any]]:
     """Take the place of the measurement; return what it was asked for, floor by floor."""
     calls: list[dict[str, Any]] = []
 
-    def measure(policy, surface, settings, trials, seconds, seed, gains, wav, **options):
-        calls.append({"surface": surface, "wav": wav, **options})
+    def measure(policy, surface, settings, trials, seconds, seed, gains, keep, **options):
+        calls.append({"surface": surface, "keep": keep, **options})
         return [_row(setting.beta, surface, setting.command_speed) for setting in settings]
 
     monkeypatch.setattr(evaluate_noise, "measure_noise", measure)
@@ -108,14 +108,15 @@ def test_a_single_setting_keeps_its_sound_in_the_file_that_was_named(asked, tmp_
     words = ["--beta", "0.5", "--out", str(tmp_path), "--wav", str(wav)]
     for command in (["noise", "--surface", "tile"], ["sweep-speed", "--speed", "1"]):
         evaluate.main([*command, *words])
-        assert asked[-1]["wav"] == {0: wav}
+        assert asked[-1]["keep"].wav == {0: wav}
+        assert asked[-1]["keep"].video == {}
 
 
 def test_the_sounds_of_a_sweep_are_told_apart_by_speed_and_beta(asked, tmp_path):
     words = ["--speed", "0.4,1", "--beta", "0,0.5", "--wav", str(tmp_path / "s.wav")]
     evaluate.main(["sweep-speed", *words, "--out", str(tmp_path)])
     names = ("s-speed0.4-beta0", "s-speed1-beta0", "s-speed0.4-beta0.5", "s-speed1-beta0.5")
-    assert asked[0]["wav"] == {i: tmp_path / f"{name}.wav" for i, name in enumerate(names)}
+    assert asked[0]["keep"].wav == {i: tmp_path / f"{name}.wav" for i, name in enumerate(names)}
 
 
 def test_a_listener_and_the_sources_come_to_the_measurement(asked, tmp_path):
@@ -127,12 +128,13 @@ def test_a_listener_and_the_sources_come_to_the_measurement(asked, tmp_path):
 
 
 def test_clipped_samples_are_a_line_on_standard_error(monkeypatch, tmp_path, capsys):
-    def measure(*_, on_clipped, **__):
-        on_clipped(Path("loud.wav"), 12)
+    def measure(*words, **__):
+        words[7].note_clipped({0: 12})
         return [_row(0.0)]
 
     monkeypatch.setattr(evaluate_noise, "measure_noise", measure)
-    evaluate.main(["noise", "--surface", "wood", "--beta", "0", "--out", str(tmp_path)])
+    words = ["--beta", "0", "--wav", "loud.wav", "--out", str(tmp_path)]
+    evaluate.main(["noise", "--surface", "wood", *words])
     assert "loud.wav: 12 samples are clipped\n" in capsys.readouterr().err
 
 
@@ -158,8 +160,8 @@ def test_a_sweep_of_more_betas_than_colours_draws_them_all(monkeypatch, tmp_path
 def test_a_walk_takes_sources_and_microphone_and_commands_the_course_speed(monkeypatch, tmp_path):
     heard = {}
 
-    def follow(env, controller, course, beta, gains, seed, hold_speed, wav, on_progress, **options):
-        on_progress(1.0)
+    def follow(env, controller, course, beta, gains, seed, hold_speed, keep, on_step, **options):
+        on_step(1.0)
         heard.update(options, hold_speed=hold_speed)
         raise MuteError("enough")
 
@@ -197,6 +199,8 @@ def test_a_walk_takes_sources_and_microphone_and_commands_the_course_speed(monke
         (["noise", "--microphone", "0,1,-0.2"], ["--microphone", "below the ground"]),
         (["noise", "--microphone", "1e9,0,1"], ["--microphone", "within 100 m"]),
         (["noise", "--wav", "walk.mp3"], ["--wav", "'walk.mp3'"]),
+        (["sweep-beta", "--video", "walk.avi"], ["--video", "'walk.avi'"]),
+        (["walk", "--video", "walk"], ["--video", "'walk'"]),
         (["walk", "--wav", "walk"], ["--wav", "'walk'"]),
         (["sweep-speed", "--speed", "0"], ["--speed", "0"]),
         (["sweep-speed", "--speed", ""], ["--speed", "none"]),

@@ -16,6 +16,7 @@ from envs.scene import SceneCfg
 from mute.acoustics.fan import FAN_LEVEL
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
+from mute.acoustics.microphone import Microphone
 from mute.acoustics.sound_level_meter import SoundLevelMeter
 from mute.acoustics.wav import read_wav
 from mute.evaluation.trials import evaluation_cfg
@@ -66,6 +67,16 @@ def test_a_standing_robot_is_heard_by_its_fan_on_the_floor_of_training():
     session, ear = _make_session()
     _walk(session, 100)
     assert ear.level() == pytest.approx(FAN_LEVEL, abs=0.3)
+
+
+def test_a_source_can_be_heard_alone_from_elsewhere():
+    env = QuadrupedEnv(
+        audible_cfg(evaluation_cfg(QuadrupedEnvCfg(num_threads=1), 1, 60.0, 0), None)
+    )
+    place = Microphone((0.0, 2.0, 0.3), "beside")
+    ear = Ear(env, "wood", GAINS, microphone=place, sources=("fan",))
+    _walk(Session(env, _Stamp(1, 0.5), Command(0.0, 0.0, 0.0, 0.5), 0.5, ear), 50)
+    assert ear.level() < FAN_LEVEL - 6.0
 
 
 def test_before_a_first_step_there_is_no_level():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 
 import pytest
 import torch
@@ -22,6 +23,7 @@ from mute.controllers import load_policy
 from mute.errors import MuteError
 from mute.evaluation.noise import NoiseRow, NoiseSetting, measure_noise
 from mute.evaluation.noise_probe import NoiseProbe
+from mute.evaluation.recordings import Recordings
 
 
 def _measure(seed: int, trials: int = 5, seconds: float = 3.0, **options) -> list[NoiseRow]:
@@ -96,11 +98,11 @@ def test_a_policy_that_acts_between_the_physics_steps_has_no_level():
 
 def test_clipped_samples_are_told_with_their_file(tmp_path, monkeypatch):
     monkeypatch.setattr(listener, "WAV_FULL_SCALE", 0.01)
-    told = {}
-    files = {0: tmp_path / "loud.wav"}
-    _measure(seed=1, trials=1, seconds=0.5, wav=files, on_clipped=told.__setitem__)
-    assert list(told) == [files[0]]
-    assert told[files[0]] > 0
+    told = []
+    keep = Recordings({0: tmp_path / "loud.wav"}, on_note=told.append)
+    _measure(seed=1, trials=1, seconds=0.5, keep=keep)
+    (note,) = told
+    assert re.fullmatch(rf"{tmp_path}/loud.wav: [1-9]\d+ samples are clipped", note)
 
 
 def test_a_quiet_walk_is_quieter_than_a_loud_one_and_both_are_louder_than_the_fan(rows):

@@ -165,6 +165,8 @@ def test_a_bad_beta_is_one_line_and_status_2():
         (("--task", "go2"), "--task must be one of go1_mute, .* got 'go2'"),
         (("--surface", "ice"), "--surface must be one of wood, carpet, .* got 'ice'"),
         (("--wav", "walk.mp3"), "--wav must name a .wav file, got 'walk.mp3'"),
+        (("--sources", "fan,voice"), "--sources must be of impacts, scuffing, drive, fan"),
+        (("--microphone", "0,1,-1"), "--microphone must be within 100 m and not below the ground"),
         (("--video", "walk.avi"), "--video must name an .mp4 file, got 'walk.avi'"),
         (("--video", "walk.mp4", "--viewer", "native"), "not with --viewer native"),
         (("--beta", "soft"), "--beta.*'soft'; see --help"),

@@ -206,6 +206,33 @@ def test_a_sound_that_cannot_be_read_leaves_the_film_as_it_was(film):
     assert sorted(film.parent.iterdir()) == [wav, film]
 
 
+def test_evaluate_films_the_first_trial_of_each_setting_with_its_sound(tmp_path, environ):
+    words = ("noise", "--surface", "wood", "--beta", "0,1", "--trials", "1", "--seconds", "1.2")
+    files = ("--video", str(tmp_path / "walk.mp4"), "--out", str(tmp_path / "out"))
+    run = subprocess.run(
+        [sys.executable, "evaluate.py", *words, *files],
+        cwd=REPOSITORY,
+        env={key: value for key, value in environ.items() if key != "MUJOCO_GL"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    paths = [tmp_path / f"walk-wood-beta{beta}.mp4" for beta in (0, 1)]
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "out", *paths]
+    levels = []
+    for path in paths:
+        rate = imageio.immeta(path)["fps"]
+        frames = imageio.imread(path)
+        # It begins when the robot has settled, and the view is from where the robot begins.
+        assert len(frames) / rate == pytest.approx(1.2, abs=1.5 / rate)
+        assert len(_dark_pixels(frames[0])) > 1000
+        sound = _sound_of(path)
+        assert len(sound) / SAMPLE_RATE == pytest.approx(1.2, abs=0.03)
+        levels.append(float(np.sqrt(np.mean(sound**2))))
+    assert levels[0] > 1.4 * levels[1] > 0.0
+
+
 # -- backends ------------------------------------------------------------------------------------
 
 

@@ -20,6 +20,7 @@ from mute.command_lines.arguments import REPOSITORY
 from mute.controllers import LearnedController, load_policy
 from mute.errors import MuteError
 from mute.evaluation.course import Course, FloorArea
+from mute.evaluation.recordings import Recordings
 from mute.evaluation.walk import Walk, follow_course, make_walk_env, time_limit
 
 POLICY = REPOSITORY / "resources" / "go1" / "go1_mute.pt"
@@ -80,7 +81,7 @@ def test_the_walk_is_louder_than_the_fan_and_the_peak_is_above_the_mean(walk):
 
 def test_keeping_the_sound_changes_no_figure(walk, tmp_path):
     path = tmp_path / "walk.wav"
-    assert _walk(COURSE, wav=path).figures() == walk.figures()
+    assert _walk(COURSE, keep=Recordings({0: path})).figures() == walk.figures()
     samples, rate = read_wav(path)
     # The file begins once the robot has settled, and holds what the cheap path measures.
     assert samples.shape[1] / rate == pytest.approx(walk.seconds - 1.0)

@@ -1,0 +1,93 @@
+"""Walks that are kept while they are measured: as sound, and as films with their sound."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from envs.quadruped_env import QuadrupedEnv
+from mute.rendering.sound_track import temporary_sound
+
+if TYPE_CHECKING:
+    from mute.rendering.video import Video
+
+__all__ = ["Filming", "Recordings", "filming"]
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """What is kept of which walks, by their index."""
+
+    wav: Mapping[int, Path] = field(default_factory=dict)
+    """Files for their sound."""
+    video: Mapping[int, Path] = field(default_factory=dict)
+    """Files for their films."""
+    on_note: Callable[[str], None] = lambda note: None
+    """Told in one line of each file that is not as one would wish: clipped, or silent."""
+
+    def spaced(self, stride: int) -> Recordings:
+        """Return the same with every index multiplied: of the first robots of groups."""
+        wav = {index * stride: path for index, path in self.wav.items()}
+        video = {index * stride: path for index, path in self.video.items()}
+        return Recordings(wav, video, self.on_note)
+
+    def note_clipped(self, samples: Mapping[int, int]) -> None:
+        """Tell of each walk whose sound has samples beyond full scale, given their numbers."""
+        for index, count in samples.items():
+            if count:
+                path = self.wav.get(index) or self.video[index]
+                self.on_note(f"{path}: {count} samples are clipped")
+
+
+@dataclass(frozen=True)
+class Filming:
+    """Films that are being made."""
+
+    sounds: Mapping[int, Path]
+    """WAV files to be written, by robot, and to be whole before the films are: those that are
+    kept, and one for each film beyond."""
+    videos: Mapping[int, Video]
+
+    def record(self) -> None:
+        """Take in the control step that the environment has just made.
+
+        Raises:
+            MuteError: If a file cannot be written.
+        """
+        for video in self.videos.values():
+            video.record()
+
+
+@contextlib.contextmanager
+def filming(env: QuadrupedEnv, recordings: Recordings, start: float) -> Iterator[Filming]:
+    """Film robots of an environment; the films are whole on leaving.
+
+    Args:
+        env: Where they walk.
+        recordings: What to keep, by robot.
+        start: Time at which films and sounds begin, s.
+
+    Raises:
+        MuteError: If nothing renders, or a film cannot be written.
+    """
+    extra = {
+        robot: temporary_sound(path)
+        for robot, path in recordings.video.items()
+        if robot not in recordings.wav
+    }
+    sounds = {**recordings.wav, **extra}
+    videos: dict[int, Video] = {}
+    with contextlib.ExitStack() as stack:
+        for sound in extra.values():
+            stack.callback(sound.unlink, missing_ok=True)
+        for robot, path in recordings.video.items():
+            from mute.rendering.video import Video  # an encoder, which only a film needs
+
+            videos[robot] = stack.enter_context(Video(path, env, sounds[robot], robot, start))
+        yield Filming(sounds, videos)
+    for video in videos.values():
+        if video.silent_because:
+            recordings.on_note(f"{video.path} is without sound: {video.silent_because}")
