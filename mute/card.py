@@ -45,6 +45,15 @@ _NOISE = {
     "stride_frequency": ("strides/s a foot", "{:.2f}"),
     "cost_of_transport": ("cost of transport", "{:.2f}"),
 }
+_SOURCES = {
+    "surface": ("floor", "{}"),
+    "beta": ("beta", "{:g}"),
+    "laeq_impacts": ("impacts", "{:.1f}"),
+    "laeq_scuffing": ("scuffing", "{:.1f}"),
+    "laeq_drive": ("drive", "{:.1f}"),
+    "laeq_fan": ("fan", "{:.1f}"),
+    "laeq_mean": ("all", "{:.1f}"),
+}
 _RATES = {
     "num_envs": ("environments", "{:d}"),
     "engine": ("engine alone", "{:,.0f}"),
@@ -98,6 +107,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         f"{noise[0]['trials']} trials:\n"
     )
     print(markdown([_noise_row(row) for row in noise], _NOISE))
+    print("\nEquivalent level of each source there (dBA, modelled):\n")
+    print(markdown(noise, _SOURCES))
     print(f"\nControl steps/s of `{benchmark['task']}` on {benchmark['machine']}:\n")
     print(markdown(benchmark["rates"], _RATES))
     return 0

@@ -16,15 +16,21 @@ __all__ = ["print_table", "read_json", "without_nan", "write_csv", "write_json"]
 
 Row = Mapping[str, Any]
 
+_FILE_WIDTH = 240
+"""Width of a table that goes to a file or a pipe, characters."""
+
 
 def print_table(title: str, rows: Sequence[Row], columns: Sequence[str]) -> None:
-    """Print some columns of a table."""
+    """Print some columns of a table, wider than 80 columns where no terminal sets a width."""
     table = Table(title=title, title_justify="left")
     for column in columns:
-        table.add_column(column, justify="right")
+        table.add_column(column, justify="right", overflow="fold")
     for row in rows:
         table.add_row(*(_shown(row[column]) for column in columns))
-    Console().print(table)
+    console = Console()
+    if not console.is_terminal:
+        console.width = max(console.width, _FILE_WIDTH)
+    console.print(table)
 
 
 def write_csv(path: Path, rows: Sequence[Row]) -> None:
