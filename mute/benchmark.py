@@ -6,9 +6,11 @@ drifts does not favour one of them. Each size runs in a process of its own, for 
 
 from __future__ import annotations
 
+from mute.memory import keep_freed_memory
 from mute.threads import configure_threads, use_collection_threads, use_learning_threads
 
 configure_threads()  # before torch is imported
+keep_freed_memory()
 
 import dataclasses
 import json
