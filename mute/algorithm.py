@@ -6,10 +6,12 @@ from typing import Any
 
 import torch
 from rsl_rl.algorithms import PPO
+from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from mute.estimated_env import EstimatedEnv
 from mute.estimation import EstimatorTrainer
+from mute.storage import PreparedModel, PreparedStorage
 from mute.threads import use_collection_threads, use_learning_threads
 from networks.estimator import State
 
@@ -27,6 +29,18 @@ class EstimatorPPO(PPO):
     """Where the estimator runs."""
     trainer: EstimatorTrainer
     """What the estimator learns by."""
+
+    @staticmethod
+    def construct_algorithm(obs: TensorDict, env: VecEnv, cfg: dict, device: str) -> EstimatorPPO:
+        """Build everything, see `PPO.construct_algorithm`; the storage prepares its batches."""
+        steps = cfg["num_steps_per_env"]
+        algorithm = PPO.construct_algorithm(obs, env, cfg, device)
+        assert isinstance(algorithm, EstimatorPPO)  # what the configuration names
+        models = [algorithm.actor, algorithm.critic]
+        storage = PreparedStorage("rl", env.num_envs, steps, obs, [env.num_actions], device)
+        storage.models = [model for model in models if isinstance(model, PreparedModel)]
+        algorithm.storage = storage
+        return algorithm
 
     def attach(self, env: EstimatedEnv, trainer: EstimatorTrainer) -> None:
         """Take on the estimator; to be called once, before anything else.

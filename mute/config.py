@@ -141,7 +141,7 @@ class AgentCfg:
     def rsl_rl(self) -> dict[str, Any]:
         """Return the configuration that rsl_rl's runner takes."""
         network = {
-            "class_name": "MLPModel",
+            "class_name": "mute.storage:PreparedModel",
             "activation": self.activation,
             "obs_normalization": True,
         }

@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import torch
-from learning_helpers import NUM_ENVS, NUM_STEPS, before_each_update, clone_tree, make_runner
+from learning_helpers import (
+    NUM_ENVS,
+    NUM_STEPS,
+    before_each_update,
+    clone_tree,
+    make_runner,
+)
 from rsl_rl.algorithms import PPO
+from rsl_rl.storage import RolloutStorage
 
 from mute.estimated_env import estimate_group
 
@@ -42,6 +49,29 @@ def test_re_unrolled_over_the_storage_the_estimator_reproduces_the_stored_estima
     assert min(ended) > 0
     # One product for all steps rounds differently, and in nothing else.
     assert max(errors) < 1e-5
+
+
+def test_an_update_sees_the_batches_of_rsl_rl_with_the_inputs_ready_made(monkeypatch):
+    runner = make_runner(iterations=1)
+    alg = runner.alg
+    seen = []
+
+    def compare() -> dict[str, float]:
+        state = torch.get_rng_state()
+        expected = list(RolloutStorage.mini_batch_generator(alg.storage, 2, 3))
+        torch.set_rng_state(state)
+        for ours, theirs in zip(alg.storage.mini_batch_generator(2, 3), expected, strict=True):
+            for name in ("actions", "values", "returns", "advantages", "old_actions_log_prob"):
+                assert torch.equal(getattr(ours, name), getattr(theirs, name))
+            for model in (alg.actor, alg.critic):
+                assert torch.equal(model(ours.observations), model(theirs.observations))
+                seen.append(model)
+        torch.set_rng_state(state)
+        return PPO.update(alg)
+
+    monkeypatch.setattr(alg, "update", compare)
+    assert runner.train()
+    assert len(seen) == 12
 
 
 def test_the_first_ratio_of_every_update_is_one(monkeypatch):
