@@ -14,10 +14,7 @@ keep_freed_memory()
 
 import dataclasses
 import json
-import resource
 import statistics
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -33,6 +30,7 @@ from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
 from mute.command_lines.arguments import command_line, parse
 from mute.errors import MuteError, run_cli
 from mute.evaluation.tables import print_table, write_json
+from mute.processes import call_apart, peak_memory_mb
 from mute.provenance import machine_kind
 from mute.runner import MuteRunner
 from mute.tasks import DEFAULT_TASK, make_task
@@ -109,13 +107,12 @@ def measure(task: str, num_envs: int, rollouts: int) -> Rates:
     seconds = {name: statistics.median(values) for name, values in times.items()}
     rates = {name: num_envs * steps / value for name, value in seconds.items()}
     loop = num_envs * steps / (seconds["collection"] + seconds["learning"])
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     return Rates(
         num_envs=num_envs,
         **rates,
         loop=loop,
         loop_over_engine=loop / rates["engine"],
-        peak_memory_mb=memory,
+        peak_memory_mb=peak_memory_mb(),
     )
 
 
@@ -145,16 +142,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _in_process(task: str, num_envs: int, rollouts: int) -> dict[str, float]:
-    code = (
-        "import dataclasses, json; from mute.benchmark import measure; "
-        f"print(json.dumps(dataclasses.asdict(measure({task!r}, {num_envs}, {rollouts}))))"
-    )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    if result.returncode != 0:
-        raise MuteError(
-            f"--num-envs {num_envs}: the measurement failed: {result.stderr.strip()[-200:]}"
-        )
-    return json.loads(result.stdout.splitlines()[-1])
+    try:
+        return call_apart("mute.benchmark", "measure", task, num_envs, rollouts)
+    except MuteError as error:
+        raise MuteError(f"--num-envs {num_envs}: {error}") from error
 
 
 def _engine(env: QuadrupedEnv, steps: int) -> Callable[[], None]:

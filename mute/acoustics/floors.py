@@ -4,19 +4,22 @@ Each figure carries its source, or is marked as chosen. Chosen figures set the c
 (a carpet is soft and damped, a board rings low, a tile is hard and bright); the level is set by
 calibration with one gain a floor, and is therefore not a claim of this table. Sources:
 
-- friction: dry rubber slides on concrete at 0.6 to 0.85 (collected handbooks, The Physics Factbook,
-  hypertextbook.com/facts/2006/MatthewMichaels.shtml). The others lie around it and around the 0.8
-  that policies are trained with.
+- friction: dry rubber slides on concrete at 0.7 (OpenStax, University Physics 1, table 6.1) to 0.8
+  (Serway and Beichner, Physics for Scientists and Engineers, 5th edition, table 5.2); shoes on wood
+  slide at 0.7 and begin to at 0.9 (OpenStax, the same table). To plan the steps of a biped, Brandao
+  et al. (Humanoids 2016, arXiv 1706.08685) take 0.88 +- 0.12 on wood, 0.83 +- 0.15 on marble, 0.97
+  +- 0.05 on ceramic and 0.82 +- 0.02 on carpet. Policies are trained around 0.8.
 - stiffness of the foot: Hertz' contact of a sphere with a plane, F = 4/3 E* sqrt(R) d^(3/2), of
-  radius R = 23 mm (Go1) and a rubber of 60 Shore A, E = 3.6 MPa by Gent (1958), Poisson's ratio
-  1/2, E* = 4.8 MPa: between 45 kN/m (secant) and 68 kN/m (tangent) at 100 N.
-- decay: constant internal friction eta, d = pi f eta and T60 = ln(1000) / d (Wildes and Richards
-  1988; Klatzky, Pai and Krotkov, Presence 9(4), 2000, on which materials are heard by). Dense
-  concrete as a material has an eta of the order of 0.01 (NPTEL 112104040, table 9.1); a floor that
-  is built in and loaded loses more.
-- restitution: a ball rebounds from carpet with 0.92 of the speed that it rebounds from wood with
-  (heights of 44 and 52 cm out of 100 cm, studymode.com, essay 109460); the rest is chosen low, as a
-  leg gives way.
+  radius R = 23 mm (Go1) and a rubber of 60 Shore A, E = 3.6 MPa by Gent (Rubber Chemistry and
+  Technology 31, 896, 1958), Poisson's ratio 1/2, E* = 4.8 MPa: between 45 kN/m (secant) and 68 kN/m
+  (tangent) at 100 N.
+- decay: constant internal friction eta, d = pi f eta and T60 = ln(1000) / d (Wildes and Richards,
+  in Natural Computation, MIT Press 1988; Klatzky, Pai and Krotkov, Presence 9(4), 2000, on which
+  materials are heard by). Eta of the materials: cast concrete 0.005 (an estimate), screed 0.01,
+  birch plywood 0.016 (Hopkins, Sound Insulation, 2007, table A2). What is built in loses more: eta
+  + m' / (485 sqrt(f)) in a test stand (ISO 12354-1:2017, formula C.3), so that a slab of 200 mm
+  with m' = 440 kg/m^2 has 0.06 at 300 Hz and 0.02 at 3 kHz.
+- restitution: chosen low, as a leg gives way, and lower on what is soft.
 
 What the numbers do in sound is the work of `impacts` and `scuffing`; putting friction and `solref`
 into a model is that of the environments.
@@ -96,11 +99,12 @@ FLOORS: dict[str, Floor] = {
     for floor in (
         Floor(
             name="wood",  # boards or parquet on joists
-            friction=0.8,  # chosen: as in training
+            friction=0.8,  # chosen: as in training, amid the 0.7 to 0.9 above
             solref=(0.015, 1.0),  # chosen: somewhat harder than the 0.02 s of training
             stiffness=1e6,  # chosen: a board between two joists bends
             restitution=0.40,  # chosen
-            # Chosen: a low, dense bank that rings ("hollow"); eta 0.06 as built, chosen.
+            # Chosen: a low, dense bank that rings ("hollow"); eta 0.06, chosen: four times that of
+            # plywood, as boards rub on each other.
             modes=_modes(
                 0.06,
                 160.0,
@@ -119,12 +123,12 @@ FLOORS: dict[str, Floor] = {
         ),
         Floor(
             name="carpet",  # tufted carpet with its backing, on a slab
-            friction=0.9,  # chosen: pile interlocks with the rubber
+            friction=0.9,  # chosen: above the 0.82, as pile interlocks with the rubber
             solref=(0.025, 1.0),  # chosen: softer than training
             # Chosen: softer than the foot. With the 0.38 to 0.67 kg of a landing foot a contact
             # takes 15 to 19 ms here, and 8 to 11 ms on the hard floors.
             stiffness=2.5e4,
-            restitution=0.37,  # 0.92 of wood
+            restitution=0.37,  # chosen
             # Chosen: three dull thuds, gone after a few periods; eta 0.4, chosen.
             modes=_modes(0.4, 1600.0, (85.0, 1.0), (190.0, 1.0), (410.0, 0.8)),
             scuff_band=(400.0, 4000.0),  # chosen: pile brushing
@@ -133,11 +137,12 @@ FLOORS: dict[str, Floor] = {
         ),
         Floor(
             name="tile",  # porcelain tiles bedded on screed
-            friction=0.7,  # chosen: smooth glaze, dry
+            friction=0.7,  # chosen: a smooth glaze, at the low end of marble above
             solref=(0.010, 1.0),  # chosen: hard
             stiffness=2e7,  # chosen: much harder than the foot
             restitution=0.45,  # chosen
-            # Chosen: bright, with a clack of a tenth of a second; eta 0.025, chosen.
+            # Chosen: bright, with a clack of a tenth of a second; eta 0.025, chosen within the 0.02
+            # to 0.06 of a slab above.
             modes=_modes(
                 0.025,
                 100.0,
@@ -155,12 +160,12 @@ FLOORS: dict[str, Floor] = {
         ),
         Floor(
             name="concrete",  # a bare trowelled slab
-            friction=0.75,  # middle of the 0.6 to 0.85 above
+            friction=0.75,  # middle of the 0.7 to 0.8 above
             solref=(0.008, 1.0),  # chosen: the hardest; above twice a step of 4 ms
             stiffness=1e8,  # chosen: rigid beside the foot
             restitution=0.45,  # chosen
-            # Chosen: bright too, but a thick slab has its modes elsewhere and loses energy into the
-            # ground; eta 0.05, chosen five times that of the material.
+            # Chosen: bright too, but a thick slab has its modes elsewhere and loses more into what
+            # it lies on; eta 0.05, chosen within the 0.02 to 0.06 above.
             modes=_modes(
                 0.05,
                 155.0,

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from mute.acoustics import meter, sound_level_meter
+from mute.acoustics.levels import P_REF, TIME_CONSTANTS
 from mute.acoustics.loudness import zwicker_loudness
 from mute.acoustics.sound_level_meter import SoundLevelMeter, measure
 from mute.acoustics.wav import write_wav
@@ -20,31 +21,41 @@ from mute.errors import MuteError
 
 RATE = 48000
 
-# IEC 61672-1:2013, Table 4: length of a burst of a 4 kHz tone (ms), and its maximum Fast and Slow
-# level less the level of the steady tone (dB).
+# IEC 61672-1:2013, Table 4: length of a burst of a 4 kHz tone (ms), its largest Fast or Slow level
+# less the level of the steady tone (dB), and the class 1 acceptance limits (dB) above and below it.
+# Compared, figure by figure, with a public transcription of the standard's page, in the repository
+# jmrplens/phonometry (tests/reference_data/sound_level_meters.py), and with the table's equation 7,
+# which ggrecow/SQAT (validation/sound_level_meter/README.md) quotes as well.
 FAST_BURSTS = (
-    (1000, 0.0),
-    (500, -0.1),
-    (200, -1.0),
-    (100, -2.6),
-    (50, -4.8),
-    (20, -8.3),
-    (10, -11.1),
-    (5, -14.1),
-    (2, -18.0),
-    (1, -21.0),
+    (1000, 0.0, 0.5, 0.5),
+    (500, -0.1, 0.5, 0.5),
+    (200, -1.0, 0.5, 0.5),
+    (100, -2.6, 1.0, 1.0),
+    (50, -4.8, 1.0, 1.0),
+    (20, -8.3, 1.0, 1.0),
+    (10, -11.1, 1.0, 1.0),
+    (5, -14.1, 1.0, 1.0),
+    (2, -18.0, 1.0, 1.5),
+    (1, -21.0, 1.0, 2.0),
+    (0.5, -24.0, 1.0, 2.5),
+    (0.25, -27.0, 1.0, 3.0),
 )
 SLOW_BURSTS = (
-    (1000, -2.0),
-    (500, -4.1),
-    (200, -7.4),
-    (100, -10.2),
-    (50, -13.1),
-    (20, -17.0),
-    (10, -20.0),
-    (5, -23.0),
-    (2, -27.0),
+    (1000, -2.0, 0.5, 0.5),
+    (500, -4.1, 0.5, 0.5),
+    (200, -7.4, 0.5, 0.5),
+    (100, -10.2, 1.0, 1.0),
+    (50, -13.1, 1.0, 1.0),
+    (20, -17.0, 1.0, 1.5),
+    (10, -20.0, 1.0, 2.0),
+    (5, -23.0, 1.0, 2.5),
+    (2, -27.0, 1.0, 3.0),
 )
+BURSTS = [
+    (time_weighting, *row)
+    for time_weighting, rows in (("fast", FAST_BURSTS), ("slow", SLOW_BURSTS))
+    for row in rows
+]
 
 
 def tone(rms=1.0, frequency=1000.0, seconds=2.0, rate=RATE):
@@ -95,19 +106,23 @@ def test_a_tone_of_1_khz_and_1_pa_has_94_db(rate, time_weighting):
     assert (levels.seconds, levels.sample_rate) == (10.0, rate)
 
 
+@pytest.mark.parametrize(("time_weighting", "milliseconds", "response"), [b[:3] for b in BURSTS])
+def test_the_table_of_bursts_is_that_of_equation_7(time_weighting, milliseconds, response):
+    risen = -math.expm1(-milliseconds / 1000.0 / TIME_CONSTANTS[time_weighting])
+    assert 10.0 * math.log10(risen) == pytest.approx(response, abs=0.0501)
+
+
 @pytest.mark.parametrize("rate", [44100, 48000, 96000])
-@pytest.mark.parametrize(("milliseconds", "response"), FAST_BURSTS)
-def test_a_tone_burst_has_the_fast_response_of_the_standard(milliseconds, response, rate):
-    (steady,) = measure(tone(frequency=4000.0, rate=rate), rate)
-    (levels,) = measure(burst(milliseconds, rate), rate)
-    assert levels.lafmax - steady.laeq == pytest.approx(response, abs=0.15)
-
-
-@pytest.mark.parametrize(("milliseconds", "response"), SLOW_BURSTS)
-def test_a_tone_burst_has_the_slow_response_of_the_standard(milliseconds, response):
-    (steady,) = measure(tone(frequency=4000.0), RATE, "slow")
-    (levels,) = measure(burst(milliseconds), RATE, "slow")
-    assert levels.lafmax - steady.laeq == pytest.approx(response, abs=0.15)
+@pytest.mark.parametrize(("time_weighting", "milliseconds", "response", "above", "below"), BURSTS)
+def test_a_tone_burst_has_the_response_of_the_standard(
+    time_weighting, milliseconds, response, above, below, rate
+):
+    (steady,) = measure(tone(frequency=4000.0, rate=rate), rate, time_weighting)
+    (levels,) = measure(burst(milliseconds, rate), rate, time_weighting)
+    deviation = levels.lafmax - steady.laeq - response
+    assert -below <= deviation <= above  # class 1
+    # What is left is the rounding of the table and, of the shortest bursts, their wide spectrum.
+    assert abs(deviation) < 0.15
 
 
 def test_two_equal_noises_are_3_db_louder_than_one():
@@ -357,10 +372,15 @@ def test_loudness_is_asked_of_the_library_in_pascals_at_48_khz(monkeypatch, caps
     assert np.std(heard["pressure"]) == pytest.approx(0.5, abs=0.001)
 
 
-def test_a_tone_of_1_khz_and_40_db_has_one_sone():
-    pytest.importorskip("mosqito")
-    loudness = zwicker_loudness(tone(2e-3, seconds=0.5), RATE)
-    assert loudness.n5 == pytest.approx(1.0, abs=0.02)
+@pytest.mark.parametrize("level", [40, 50, 60, 70])
+def test_a_tone_of_1_khz_has_the_loudness_that_defines_the_sone(level):
+    # 40 dB is one sone by definition, and from there on each 10 dB double it (ISO 532-1:2017).
+    pytest.importorskip("mosqito", reason="needs mute[loudness]")
+    loudness = zwicker_loudness(tone(P_REF * 10.0 ** (level / 20.0), seconds=0.5), RATE)
+    sone = 2.0 ** ((level - 40) / 10.0)
+    # The standard allows an implementation 5 % (validation/Loudness_ISO532_1 of ggrecow/SQAT).
+    assert loudness.n5 == pytest.approx(sone, rel=0.05)
+    assert loudness.maximum == pytest.approx(sone, rel=0.05)
 
 
 def test_the_meter_for_arrays_needs_numpy_and_scipy_alone():
