@@ -23,6 +23,7 @@ from mute.estimated_env import EstimatedEnv
 from mute.estimation import EstimatorTrainer
 from mute.evaluation.noise_probe import NoiseProbe
 from mute.logger import TrainingLogger
+from mute.threads import use_collection_threads
 from networks.estimator import Estimator
 
 __all__ = ["MuteRunner", "policy_part"]
@@ -180,6 +181,7 @@ class MuteRunner(OnPolicyRunner):
             return {}
         with torch.random.fork_rng(devices=[]):  # networks are born with random weights
             policy = make_policy(policy_part(self.alg.save() | self._about(iteration)))
+        use_collection_threads()
         self._levels = self._noise_probe.measure(policy)
         return self._levels
 
