@@ -8,27 +8,18 @@ the normalisers learn only after the update. The batches are bit for bit those o
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from typing import Any
 
 import torch
 from rsl_rl.models import MLPModel
 from rsl_rl.modules import HiddenState
 from rsl_rl.storage import RolloutStorage
 from tensordict import TensorDict
-from torch import nn
 
 __all__ = ["PreparedModel", "PreparedStorage"]
 
 
 class PreparedModel(MLPModel):
     """rsl_rl's model, which takes its input ready made where the observations hold it."""
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401
-        """Take what `MLPModel` takes."""
-        super().__init__(*args, **kwargs)
-        for module in self.modules():
-            if isinstance(module, nn.ELU):
-                module.inplace = True  # the same values, and a tenth of the update's time less
 
     def get_latent(
         self,
