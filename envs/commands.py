@@ -77,9 +77,11 @@ class CommandSampler:
         self.generator = generator
         self.command = torch.zeros(num_envs, 4, device=device)
         """Commands (v_x, v_y, w_z, beta). Shape: (num_envs, 4)."""
-        ranges = torch.tensor([cfg.lin_vel_x, cfg.lin_vel_y, cfg.ang_vel_z, cfg.beta])
-        self._low = ranges[:, 0].to(device)
-        self._span = (ranges[:, 1] - ranges[:, 0]).to(device)
+        ranges = torch.tensor(
+            [cfg.lin_vel_x, cfg.lin_vel_y, cfg.ang_vel_z, cfg.beta], device=device
+        )
+        self._low = ranges[:, 0]
+        self._span = ranges[:, 1] - ranges[:, 0]
 
     @property
     def beta(self) -> torch.Tensor:

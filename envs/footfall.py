@@ -46,7 +46,14 @@ class Footfalls:
     Order within a control step: `record` the physics steps, then `update`.
     """
 
-    def __init__(self, cfg: FootfallCfg, num_envs: int, timestep: float, decimation: int) -> None:
+    def __init__(
+        self,
+        cfg: FootfallCfg,
+        num_envs: int,
+        timestep: float,
+        decimation: int,
+        device: torch.device | str = "cpu",
+    ) -> None:
         """Allocate the history.
 
         Args:
@@ -54,6 +61,7 @@ class Footfalls:
             num_envs: Number of robots.
             timestep: Physics step, s.
             decimation: Physics steps a control step.
+            device: Where the history lives.
         """
         step_dt = timestep * decimation
         self.min_steps = max(1, round(cfg.min_segment / step_dt))
@@ -65,21 +73,24 @@ class Footfalls:
         # A landing is confirmed min_steps - 1 control steps late and looks back over its window.
         self._depth = (self.min_steps + math.ceil(self._window / decimation)) * decimation
         shape = (num_envs, _NUM_FEET)
-        self._drop = torch.zeros(self._depth, *shape)
-        self._raise = torch.zeros(decimation, *shape)
-        self._touch = torch.zeros(self._depth, *shape, dtype=torch.bool)
-        self._contacts = CausalContacts(num_envs, _NUM_FEET, min_steps=self.min_steps)
-        self.drop_sq = torch.zeros(shape)
+        self._drop = torch.zeros(self._depth, *shape, device=device)
+        self._raise = torch.zeros(decimation, *shape, device=device)
+        self._touch = torch.zeros(self._depth, *shape, dtype=torch.bool, device=device)
+        self._step = torch.arange(self._depth, device=device)[:, None, None]
+        self._contacts = CausalContacts(
+            num_envs, _NUM_FEET, min_steps=self.min_steps, device=device
+        )
+        self.drop_sq = torch.zeros(shape, device=device)
         """Mean over the physics steps of max(-v_z, 0)^2, (m/s)^2. Shape: (num_envs, 4)."""
-        self.raise_sq = torch.zeros(shape)
+        self.raise_sq = torch.zeros_like(self.drop_sq)
         """Mean over the physics steps of max(v_z, 0)^2, (m/s)^2. Shape: (num_envs, 4)."""
-        self.contact_share = torch.zeros(shape)
+        self.contact_share = torch.zeros_like(self.drop_sq)
         """Share of the physics steps with contact. Shape: (num_envs, 4)."""
-        self.raw_contact = torch.zeros(shape, dtype=torch.bool)
+        self.raw_contact = torch.zeros_like(self.drop_sq, dtype=torch.bool)
         """Contact at any physics step of the control step. Shape: (num_envs, 4)."""
-        self.landing_speed = torch.zeros(shape)
+        self.landing_speed = torch.zeros_like(self.drop_sq)
         """Landing speed where `touchdown`, else 0, m/s. Shape: (num_envs, 4)."""
-        self.swing_apex = torch.zeros(shape)
+        self.swing_apex = torch.zeros_like(self.drop_sq)
         """Highest clearance of the current or, in stance, last swing, m. Shape: (num_envs, 4)."""
 
     @property
@@ -160,7 +171,7 @@ class Footfalls:
     def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
         """Continue from a `state_dict`."""
         for name in _STATE_TENSORS:
-            setattr(self, name, state[name].clone())
+            setattr(self, name, state[name].to(self._drop.device, copy=True))
         prefix = "contacts/"
         contacts = {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}
         self._contacts.load_state_dict(contacts)
@@ -171,18 +182,12 @@ class Footfalls:
         The physics step that first finds contact still carries the velocity of the approach: the
         contact force acts from the next one on. It belongs to the window.
         """
-        result = torch.zeros_like(self.drop_sq)
-        env_ids, feet = self.touchdown.nonzero(as_tuple=True)
-        if env_ids.numel() == 0:
-            return result
         # The run of contact that was just confirmed began min_steps - 1 control steps ago.
         begin = self._depth - self.min_steps * self._decimation
-        drop, touch = self._drop[:, env_ids, feet], self._touch[begin:, env_ids, feet]
-        first = begin + touch.int().argmax(dim=0)
-        row = torch.arange(self._depth).unsqueeze(1)
-        inside = (row <= first) & (row > first - self._window)
-        result[env_ids, feet] = (drop * inside).amax(dim=0)
-        return result
+        first = begin + self._touch[begin:].int().argmax(dim=0)
+        inside = (self._step <= first) & (self._step > first - self._window)
+        # Of all feet, though few have landed: to pick these out, a GPU would have to be waited for.
+        return torch.where(self.touchdown, (self._drop * inside).amax(dim=0), 0.0)
 
 
 _STATE_TENSORS = (

@@ -94,10 +94,14 @@ def slices(widths: dict[str, int]) -> dict[str, slice]:
     return result
 
 
-def noise_amplitude(cfg: ObservationsCfg) -> torch.Tensor:
+def noise_amplitude(cfg: ObservationsCfg, device: torch.device | str = "cpu") -> torch.Tensor:
     """Return the half width of the noise on the scaled observation. Shape: (OBS_DIM,)."""
+    sizes = {
+        name: cfg.noise.get(name, 0.0) * cfg.scales[name] * cfg.noise_level
+        for name in OBSERVATION_WIDTHS
+    }
     parts = [
-        torch.full((width,), cfg.noise.get(name, 0.0) * cfg.scales[name] * cfg.noise_level)
+        torch.full((width,), sizes[name], device=device)
         for name, width in OBSERVATION_WIDTHS.items()
     ]
     return torch.cat(parts)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, get_args
 
 import torch
 from rsl_rl.env import VecEnv
@@ -35,7 +35,7 @@ from envs.scene import (
     sensor_history,
     sensor_slice,
 )
-from envs.simulation import make_simulation
+from envs.simulation import Engine, make_simulation
 from envs.terrain import FlatTerrain, HeightMapCfg, height_map
 
 __all__ = ["NUM_ACTIONS", "QuadrupedEnv", "QuadrupedEnvCfg"]
@@ -57,8 +57,11 @@ class QuadrupedEnvCfg:
     """Number of robots."""
     seed: int = 0
     """Seed of every draw in the environment."""
+    engine: Engine = "auto"
+    """Physics: `mjbatch` on the CPU, `warp` (MuJoCo Warp), or `auto`, the one that suits the
+    device."""
     num_threads: int = 0
-    """Threads of the physics engine; 0 takes every logical CPU."""
+    """Threads of `mjbatch`; 0 takes every logical CPU."""
     decimation: int = 4
     """Physics steps a control step; with 5 ms steps, 50 Hz."""
     episode_length: float = 20.0
@@ -96,6 +99,10 @@ class QuadrupedEnvCfg:
         Raises:
             ValueError: If one is out of its range.
         """
+        if self.engine not in get_args(Engine):
+            raise ValueError(
+                f"env.engine must be one of {', '.join(get_args(Engine))}, got {self.engine!r}"
+            )
         for name in ("num_envs", "decimation"):
             if getattr(self, name) < 1:
                 raise ValueError(f"env.{name} must be >= 1, got {getattr(self, name)}")
@@ -122,13 +129,22 @@ class QuadrupedEnv(VecEnv):
     Observation groups: `policy` (o_t, noised; shape (num_envs, 46)) and `privileged` (true
     velocity, heights, contacts, causal phases, physics; see `privileged_slices`). Every step
     returns new tensors: rsl_rl keeps references.
+
+    Everything lives on the engine's device. A GPU is waited for only where the program takes a
+    branch on what the robots did (a byte or a count: unstable, finished, due for a command or a
+    push, and what is logged of landings); nothing else leaves it.
     """
 
-    def __init__(self, cfg: QuadrupedEnvCfg) -> None:
+    def __init__(self, cfg: QuadrupedEnvCfg, device: str = "cpu") -> None:
         """Compile the scene, draw the physics of every robot and reset all.
 
+        Args:
+            cfg: The task.
+            device: Device of the engine; with `mjbatch`, which has the CPU alone, everything stays
+                there.
+
         Raises:
-            ValueError: If the configuration is out of range.
+            ValueError: If the configuration is out of range, or the engine cannot be had.
         """
         self.cfg: QuadrupedEnvCfg = cfg  # pyright: ignore[reportIncompatibleVariableOverride]
         self.num_envs = cfg.num_envs
@@ -140,20 +156,24 @@ class QuadrupedEnv(VecEnv):
         """Called after every physics step, with the engine's state of that step to be read."""
         self.step_dt = cfg.step_dt
         self.max_episode_length = math.ceil(cfg.episode_length / cfg.step_dt)
-        self.generator = torch.Generator().manual_seed(cfg.seed)
         self.model = build_scene(cfg.scene, foot_samples=cfg.decimation)
-        self.simulation = make_simulation(self.model, cfg.num_envs, num_threads=cfg.num_threads)
+        self.simulation = make_simulation(
+            self.model, cfg.num_envs, device, cfg.num_threads, cfg.engine
+        )
         self.device = self.simulation.device
+        self.generator = torch.Generator(self.device).manual_seed(cfg.seed)
         self.physics = randomize_physics(self.simulation, cfg.randomization, self.generator)
         """Randomised physics as the critic sees it. Shape: (num_envs, PHYSICS_DIM)."""
         self._bind_sensors()
-        self.grid = cfg.height_map.grid()
+        self.grid = cfg.height_map.grid(self.device)
         """Points of the height map in the heading frame, m. Shape: (num_heights, 2)."""
         self.terrain = FlatTerrain()
         self.commands = CommandSampler(cfg.commands, cfg.num_envs, self.generator, self.device)
-        self.footfalls = Footfalls(cfg.footfall, cfg.num_envs, cfg.scene.timestep, cfg.decimation)
+        self.footfalls = Footfalls(
+            cfg.footfall, cfg.num_envs, cfg.scene.timestep, cfg.decimation, self.device
+        )
         self.reward_sum = RewardSum(cfg.rewards, cfg.step_dt, cfg.num_envs, self.device)
-        self.stand = torch.tensor(STAND_JOINT_POS)
+        self.stand = torch.tensor(STAND_JOINT_POS, device=self.device)
         """Joint positions of the stance, rad. Shape: (12,)."""
         self.privileged_slices = slices(
             {
@@ -165,9 +185,9 @@ class QuadrupedEnv(VecEnv):
             }
         )
         """Columns of each part of the group `privileged`."""
-        self._noise = noise_amplitude(cfg.observations)
+        self._noise = noise_amplitude(cfg.observations, self.device)
         self._allocate()
-        self._reset(torch.ones(self.num_envs, dtype=torch.bool))
+        self._reset(self._everyone())
         self._observe()
 
     # -- VecEnv ---------------------------------------------------------------------------------
@@ -252,7 +272,7 @@ class QuadrupedEnv(VecEnv):
         Args:
             mask: Robots that begin anew; None for all. Shape: (num_envs,), bool.
         """
-        self._reset(torch.ones(self.num_envs, dtype=torch.bool) if mask is None else mask)
+        self._reset(self._everyone() if mask is None else mask)
         self._observe()
         return self._observations
 
@@ -276,14 +296,14 @@ class QuadrupedEnv(VecEnv):
         """
         self.simulation.load_state_dict(state["simulation"])
         for name in _STATE_TENSORS:
-            setattr(self, name, state[name].clone())
+            setattr(self, name, state[name].to(self.device, copy=True))
         self.step_count = state["step_count"]
         self.unstable_count = state["unstable_count"]
         self.commands.command.copy_(state["command"])
         self.generator.set_state(state["generator"])
         self.footfalls.load_state_dict(state["footfalls"])
         self._read_state()
-        groups = {key: value.clone() for key, value in state["observations"].items()}
+        groups = {k: value.to(self.device, copy=True) for k, value in state["observations"].items()}
         self._observations = TensorDict(groups, batch_size=[self.num_envs])
 
     # -- one step, in order ----------------------------------------------------------------------
@@ -376,7 +396,7 @@ class QuadrupedEnv(VecEnv):
         """Begin new episodes for the masked robots; no other robot is touched."""
         simulation, cfg = self.simulation, self.cfg
         simulation.reset(mask, keyframe=self.model.key("stand").id)
-        draw = 2.0 * torch.rand(self.num_envs, 19, generator=self.generator) - 1.0
+        draw = 2.0 * self._draw(self.num_envs, 19) - 1.0
         column = mask.unsqueeze(1)
         qpos, qvel = simulation.qpos, simulation.qvel
         joint_pos = self.stand + cfg.initial_joint_noise * draw[:, :12]
@@ -416,7 +436,7 @@ class QuadrupedEnv(VecEnv):
         interval = max(1, round(cfg.push_interval / self.step_dt))
         due = (age % interval == 0) & (age > 0)
         if bool(due.any()):
-            push = 2.0 * torch.rand(self.num_envs, 2, generator=self.generator) - 1.0
+            push = 2.0 * self._draw(self.num_envs, 2) - 1.0
             push *= cfg.push_velocity * due.unsqueeze(1)
             self.simulation.qvel[:, :2] += push
             self._read_state()  # the critic and the estimator's label know of the push
@@ -432,8 +452,7 @@ class QuadrupedEnv(VecEnv):
             self.commands.command,
         )
         if self.cfg.observations.noise_level > 0.0:
-            draw = torch.rand(policy.shape, generator=self.generator)
-            policy += self._noise * (2.0 * draw - 1.0)
+            policy += self._noise * (2.0 * self._draw(*policy.shape) - 1.0)
         heights = height_map(self.terrain, self.grid, self.base_pos, self.heading)
         feet = self.footfalls
         privileged = torch.cat(
@@ -470,10 +489,21 @@ class QuadrupedEnv(VecEnv):
         if bool(finished.any()):
             log["Episode/fall_rate"] = terminated.sum() / finished.sum()
         log["Episode/unstable"] = self.unstable.sum().float()
-        log["Curriculum/quiet"] = torch.tensor(self.quiet)
-        log["Curriculum/lift"] = torch.tensor(self.lift)
-        log["Curriculum/commands"] = torch.tensor(self._ramp(self.cfg.commands.ramp))
+        for name, share in (
+            ("quiet", self.quiet),
+            ("lift", self.lift),
+            ("commands", self._ramp(self.cfg.commands.ramp)),
+        ):
+            log[f"Curriculum/{name}"] = torch.full((), share, device=self.device)
         return log
+
+    def _draw(self, *shape: int) -> torch.Tensor:
+        """Return random numbers in [0, 1)."""
+        return torch.rand(shape, generator=self.generator, device=self.device)
+
+    def _everyone(self) -> torch.Tensor:
+        """Return a mask of all robots. Shape: (num_envs,)."""
+        return torch.ones(self.num_envs, dtype=torch.bool, device=self.device)
 
     # -- set-up ----------------------------------------------------------------------------------
 
@@ -499,17 +529,17 @@ class QuadrupedEnv(VecEnv):
         self._foot_contact_history = past(f"{LEGS[0]}_foot_contact")[..., 0]
 
     def _allocate(self) -> None:
-        num_envs = self.num_envs
-        zeros = torch.zeros(num_envs, NUM_ACTIONS)
+        num_envs, device = self.num_envs, self.device
+        zeros = torch.zeros(num_envs, NUM_ACTIONS, device=device)
         self.action, self.last_action, self.action_before_last = zeros, zeros, zeros
         self.last_joint_vel = zeros
-        self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long)
-        self.unstable = torch.zeros(num_envs, dtype=torch.bool)
-        self.fallen = torch.zeros(num_envs, dtype=torch.bool)
-        self.power = torch.zeros(num_envs)
+        self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long, device=device)
+        self.unstable = torch.zeros(num_envs, dtype=torch.bool, device=device)
+        self.fallen = torch.zeros(num_envs, dtype=torch.bool, device=device)
+        self.power = torch.zeros(num_envs, device=device)
         self.step_count = 0
         self.unstable_count = 0
-        self._estimated_phase = torch.zeros(num_envs, len(LEGS))
+        self._estimated_phase = torch.zeros(num_envs, len(LEGS), device=device)
 
 
 _STATE_TENSORS = (

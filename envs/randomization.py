@@ -87,10 +87,12 @@ def randomize_physics(
     """
     num_envs, model = simulation.num_envs, simulation.model
     if not cfg.enabled:
-        return torch.zeros(num_envs, PHYSICS_DIM)
+        return torch.zeros(num_envs, PHYSICS_DIM, device=simulation.device)
 
     def draw(bounds: tuple[float, float], *shape: int) -> torch.Tensor:
-        unit = torch.rand(num_envs, *shape, generator=generator, dtype=torch.float64)
+        unit = torch.rand(
+            num_envs, *shape, generator=generator, dtype=torch.float64, device=simulation.device
+        )
         return bounds[0] + (bounds[1] - bounds[0]) * unit
 
     friction = draw(cfg.friction, 1)

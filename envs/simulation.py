@@ -1,20 +1,24 @@
 """A batch of MuJoCo simulations behind a small protocol.
 
 The environment talks to `Simulation` alone, so that an engine can be exchanged without touching a
-reward or an observation. `BatchSimulation` is the CPU engine, on `mjbatch`. What a robot is, when
-it is reset and to which state is the environment's business.
+reward or an observation. `BatchSimulation` is the CPU engine, on `mjbatch`; the GPU engine has a
+module of its own, `envs.warp_simulation`. What a robot is, when it is reset and to which state is
+the environment's business.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Literal, Protocol
 
 import mujoco
 import numpy as np
 import torch
 from mjbatch import Batch
 
-__all__ = ["BatchSimulation", "Simulation", "make_simulation"]
+__all__ = ["MAX_SPEED", "BatchSimulation", "Engine", "Simulation", "make_simulation"]
+
+Engine = Literal["auto", "mjbatch", "warp"]
+"""MuJoCo on the CPU's threads, MuJoCo Warp, or the one that suits the device."""
 
 _BAD_STATE = [
     int(warning)
@@ -25,7 +29,7 @@ _BAD_STATE = [
     )
 ]
 
-_MAX_SPEED = 200.0
+MAX_SPEED = 200.0
 """Largest generalised speed (m/s or rad/s) of a simulation that still counts as stable: over six
 times the fastest joint. Far below MuJoCo's own limit (1e10), whose rewards would poison a batch."""
 
@@ -115,7 +119,11 @@ class BatchSimulation:
         self.ctrl = self._bind("ctrl")
         self.sensordata = self._bind("sensordata")
         self.actuator_force = self._bind("actuator_force")
-        self.history = self._bind("history") if model.nhistory else torch.zeros(num_envs, 0)
+        self.history = (
+            self._bind("history")
+            if model.nhistory
+            else torch.zeros(num_envs, 0, device=self.device)
+        )
         self._state = self._batch.bind("state")
         self._time = self._batch.bind("time")
         self._warnings = torch.from_numpy(self._batch.bind("warning"))
@@ -145,7 +153,7 @@ class BatchSimulation:
         """Return which simulations blew up since their last reset. Shape: (num_envs,)."""
         warned = (self._warnings[:, _BAD_STATE, 1] > 0).any(dim=1)
         # Negated, so that NaN counts as too fast.
-        too_fast = ~(self.qvel.abs().amax(dim=1) < _MAX_SPEED)
+        too_fast = ~(self.qvel.abs().amax(dim=1) < MAX_SPEED)
         return warned | too_fast | torch.from_numpy(self._failed)
 
     def field(self, name: str) -> torch.Tensor:
@@ -170,8 +178,14 @@ class BatchSimulation:
         """Continue from a `state_dict`.
 
         Raises:
-            ValueError: If the state belongs to another model or another number of simulations.
+            ValueError: If the state belongs to another engine, another model or another number of
+                simulations.
         """
+        if "integration" not in state:
+            raise ValueError(
+                "simulation state is not of the engine 'mjbatch': go on with the engine and the"
+                " device that it was saved with"
+            )
         integration = state["integration"].numpy()
         if integration.shape != self._state.shape:
             raise ValueError(
@@ -195,13 +209,26 @@ class BatchSimulation:
 
 
 def make_simulation(
-    model: mujoco.MjModel, num_envs: int, device: str = "cpu", num_threads: int = 0
+    model: mujoco.MjModel,
+    num_envs: int,
+    device: str = "cpu",
+    num_threads: int = 0,
+    engine: Engine = "auto",
 ) -> Simulation:
-    """Return the engine for a device.
+    """Return a batch of simulations.
+
+    Args:
+        model: The compiled model.
+        num_envs: Number of simulations.
+        device: Device that `engine` is to run on; `mjbatch` runs on the CPU, whatever it is.
+        num_threads: Size of the thread pool of `mjbatch`; 0 takes every logical CPU.
+        engine: The engine; `auto` is `mjbatch` on the CPU and `warp` elsewhere.
 
     Raises:
-        ValueError: If there is no engine for the device.
+        ValueError: If the engine is not installed, or there is no such device.
     """
-    if torch.device(device).type != "cpu":
-        raise ValueError(f"simulation device must be 'cpu', got {device!r}")
-    return BatchSimulation(model, num_envs, num_threads)
+    if engine == "mjbatch" or (engine == "auto" and torch.device(device).type == "cpu"):
+        return BatchSimulation(model, num_envs, num_threads)
+    from envs.warp_simulation import WarpSimulation  # leaves Warp out where nobody asks for it
+
+    return WarpSimulation(model, num_envs, device)

@@ -34,10 +34,10 @@ class HeightMapCfg:
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"height_map.{name} must be >= 0 and finite, got {value}")
 
-    def grid(self) -> torch.Tensor:
+    def grid(self, device: torch.device | str = "cpu") -> torch.Tensor:
         """Return the grid points in the heading frame, m. Shape: (num_points, 2)."""
-        along = _centred(self.length, self.spacing)
-        across = _centred(self.width, self.spacing)
+        along = _centred(self.length, self.spacing, device)
+        across = _centred(self.width, self.spacing, device)
         return torch.cartesian_prod(along, across)
 
 
@@ -70,6 +70,6 @@ def height_map(
     return base_pos[:, 2:3] - ground
 
 
-def _centred(extent: float, spacing: float) -> torch.Tensor:
+def _centred(extent: float, spacing: float, device: torch.device | str) -> torch.Tensor:
     half = round(extent / spacing / 2)
-    return torch.arange(-half, half + 1) * spacing
+    return torch.arange(-half, half + 1, device=device) * spacing

@@ -58,12 +58,12 @@ class MuteRunner(OnPolicyRunner):
             task: Name of the task, for the checkpoint.
             cfg: Its configuration.
             log_dir: Directory of the run; None keeps nothing.
-            device: Device of the networks.
+            device: Device of the networks and, unless `env.engine` forbids it, of the physics.
             on_iteration: Called with (iteration, total, scalars) after each iteration.
         """
         torch.manual_seed(cfg.env.seed)
         self.task, self.task_cfg = task, cfg
-        env = QuadrupedEnv(cfg.env)
+        env = QuadrupedEnv(cfg.env, device)
         estimation = cfg.agent.estimation
         estimator = Estimator(OBS_DIM, env.grid.shape[0], estimation.network).to(device)
         estimated = EstimatedEnv(env, estimator, device, estimation.actor_uses_phase)
@@ -150,8 +150,8 @@ class MuteRunner(OnPolicyRunner):
         Raises:
             CheckpointError: If it is damaged, foreign, or of another configuration.
         """
-        # On the CPU whatever the device: the simulation lives there, and networks and optimisers
-        # move what they load to where they are.
+        # On the CPU whatever the device: environment, networks and optimisers move what they load
+        # to where they are, and the random states stay where they belong.
         checkpoint = load_checkpoint(Path(path), map_location or "cpu")
         try:
             self.alg.load(checkpoint, load_cfg, strict)

@@ -30,7 +30,7 @@ from mute.tasks import DEFAULT_TASK, make_task
 __all__ = ["main"]
 
 _GPU_ENVS = 4096
-"""Environments of `go1_mute` where the networks are on a GPU; its own 1024 suit a CPU."""
+"""Environments of `go1_mute` on a GPU; its own 1024 suit a CPU."""
 _PARAMETERS = "config.yaml"
 
 
@@ -47,7 +47,7 @@ class TrainArgs:
     seed: int | None = None
     """Seed of everything random."""
     device: str = "auto"
-    """auto, cpu or cuda: where the networks live."""
+    """auto, cpu or cuda: where networks and physics live."""
     run_name: str = ""
     """Name of the run; by default the date and time."""
     log_dir: Path = Path("runs")
@@ -75,6 +75,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     torch.set_float32_matmul_precision(cfg.agent.matmul_precision)
     run_dir = checkpoint.parent if checkpoint else _new_run(args)
     display = PlainDisplay() if args.plain else LiveDisplay(args.task)
+    if cfg.env.engine == "warp" or (cfg.env.engine == "auto" and device == "cuda"):
+        print("Warp compiles its kernels at their first use, for a minute or more", file=sys.stderr)
     try:
         runner = MuteRunner(args.task, cfg, run_dir, device, display.update)
     except (ValueError, SceneError) as error:

@@ -20,7 +20,8 @@ def evaluation_cfg(
 ) -> QuadrupedEnvCfg:
     """Return a task's environment for measuring.
 
-    Commands are set by whoever measures and never drawn anew within an episode.
+    Commands are set by whoever measures and never drawn anew within an episode. The engine is the
+    one that suits the device, whichever the policy was trained with.
 
     Args:
         cfg: The environment that the policy was trained in.
@@ -33,6 +34,7 @@ def evaluation_cfg(
     measured = dataclasses.replace(
         cfg,
         num_envs=num_envs,
+        engine="auto",
         seed=seed,
         # One step longer than the trial, so that its last step is measured and not reset.
         episode_length=seconds + cfg.step_dt,

@@ -1,25 +1,31 @@
-"""Tests of the batch of simulations behind its protocol."""
+"""Tests of the protocol of `envs.simulation`, which every engine is held to."""
 
 from __future__ import annotations
 
+import functools
 import math
 
 import pytest
 import torch
 
 from envs.scene import SceneCfg, build_scene, sensor_history, sensor_slice
-from envs.simulation import BatchSimulation, make_simulation
+from envs.simulation import BatchSimulation, Engine, make_simulation
 
 MODEL = build_scene(SceneCfg())
 LIVE = ("qpos", "qvel", "ctrl", "sensordata", "actuator_force")
 
 
-def _make_standing(num_envs=2):
+def _make_standing(num_envs=2, engine: Engine = "mjbatch"):
     """Make robots that hold the standing pose."""
-    simulation = BatchSimulation(MODEL, num_envs, num_threads=1)
+    simulation = make_simulation(MODEL, num_envs, num_threads=1, engine=engine)
     simulation.reset(torch.ones(num_envs, dtype=torch.bool))
     simulation.ctrl[:] = simulation.qpos[:, 7:]
     return simulation
+
+
+@pytest.fixture(params=["mjbatch", "warp"])
+def make_standing(request):
+    return functools.partial(_make_standing, engine=request.param)
 
 
 def _tensors(simulation, index):
@@ -31,16 +37,16 @@ def _assert_same(left, right):
         assert torch.equal(left[name], right[name]), name
 
 
-def test_tensors_have_the_shapes_of_the_model():
-    simulation = _make_standing(3)
+def test_tensors_have_the_shapes_of_the_model(make_standing):
+    simulation = make_standing(3)
     shapes = {name: getattr(simulation, name).shape for name in LIVE}
     widths = (MODEL.nq, MODEL.nv, MODEL.nu, MODEL.nsensordata, MODEL.nu)
     assert shapes == dict(zip(LIVE, [(3, width) for width in widths], strict=True))
 
 
 @pytest.mark.parametrize("name", ["qpos", "qvel", "sensordata", "actuator_force"])
-def test_a_tensor_that_was_kept_shows_the_next_step(name):
-    simulation = _make_standing()
+def test_a_tensor_that_was_kept_shows_the_next_step(make_standing, name):
+    simulation = make_standing()
     simulation.step()
     kept = getattr(simulation, name)
     before = kept.clone()
@@ -50,8 +56,8 @@ def test_a_tensor_that_was_kept_shows_the_next_step(name):
     assert kept is getattr(simulation, name)
 
 
-def test_a_written_position_moves_the_sensors_of_its_robot_alone():
-    simulation = _make_standing()
+def test_a_written_position_moves_the_sensors_of_its_robot_alone(make_standing):
+    simulation = make_standing()
     height = sensor_slice(MODEL, "FR_foot_pos", 1).stop - 1
     before = simulation.sensordata[:, height].clone()
     simulation.qpos[1, 2] += 0.5
@@ -60,8 +66,8 @@ def test_a_written_position_moves_the_sensors_of_its_robot_alone():
     assert simulation.sensordata[1, height].item() == pytest.approx(before[1].item() + 0.5)
 
 
-def test_a_written_velocity_is_integrated():
-    simulation = _make_standing()
+def test_a_written_velocity_is_integrated(make_standing):
+    simulation = make_standing()
     simulation.qpos[:, 2] += 1.0
     simulation.qvel[1, 0] = 1.0
     simulation.step(10)
@@ -69,8 +75,8 @@ def test_a_written_velocity_is_integrated():
     assert simulation.qpos[1, 0].item() == pytest.approx(10 * 0.005, abs=2e-3)
 
 
-def test_a_written_set_point_pulls_its_joint():
-    simulation = _make_standing()
+def test_a_written_set_point_pulls_its_joint(make_standing):
+    simulation = make_standing()
     simulation.qpos[:, 2] += 1.0
     simulation.ctrl[1, 1] += 0.3
     simulation.step()
@@ -78,8 +84,8 @@ def test_a_written_set_point_pulls_its_joint():
     assert simulation.actuator_force[1, 1].item() == pytest.approx(20.0 * 0.3, rel=1e-3)
 
 
-def test_forward_of_a_mask_leaves_the_others_readings_as_they_are():
-    simulation = _make_standing()
+def test_forward_of_a_mask_leaves_the_others_readings_as_they_are(make_standing):
+    simulation = make_standing()
     before = simulation.sensordata.clone()
     simulation.qpos[:, 2] += 0.5
     simulation.forward(torch.tensor([True, False]))
@@ -87,8 +93,8 @@ def test_forward_of_a_mask_leaves_the_others_readings_as_they_are():
     assert torch.equal(simulation.sensordata[1], before[1])
 
 
-def test_each_robot_slides_on_its_own_friction():
-    simulation = _make_standing()
+def test_each_robot_slides_on_its_own_friction(make_standing):
+    simulation = make_standing()
     simulation.field("geom_friction")[0, :, 0] = 0.05
     simulation.field("geom_friction")[1, :, 0] = 1.0
     simulation.qvel[:, 1] = 0.5
@@ -99,8 +105,8 @@ def test_each_robot_slides_on_its_own_friction():
     assert 0.05 - rough > 5.0 * (0.05 - slippery)
 
 
-def test_each_robot_has_its_own_gains():
-    simulation = _make_standing()
+def test_each_robot_has_its_own_gains(make_standing):
+    simulation = make_standing()
     simulation.field("actuator_gainprm")[0] = 0.0
     simulation.field("actuator_biasprm")[0] = 0.0
     simulation.ctrl += 0.1
@@ -109,14 +115,14 @@ def test_each_robot_has_its_own_gains():
     assert (simulation.actuator_force[1] > 1.0).all()
 
 
-def test_a_field_begins_as_the_model_has_it():
-    mass = _make_standing().field("body_mass")
+def test_a_field_begins_as_the_model_has_it(make_standing):
+    mass = make_standing().field("body_mass")
     expected = torch.from_numpy(MODEL.body_mass).to(mass.dtype).expand_as(mass)
     assert torch.equal(mass, expected)
 
 
-def test_a_reset_puts_the_masked_robots_to_the_keyframe_and_touches_no_other():
-    simulation, twin = _make_standing(), _make_standing()
+def test_a_reset_puts_the_masked_robots_to_the_keyframe_and_touches_no_other(make_standing):
+    simulation, twin = make_standing(), make_standing()
     for each in (simulation, twin):
         each.ctrl += 0.3
         each.step(7)
@@ -130,8 +136,8 @@ def test_a_reset_puts_the_masked_robots_to_the_keyframe_and_touches_no_other():
     _assert_same(_tensors(simulation, 1), _tensors(twin, 1))
 
 
-def test_readings_are_current_after_a_reset():
-    simulation = _make_standing()
+def test_readings_are_current_after_a_reset(make_standing):
+    simulation = make_standing()
     expected = simulation.sensordata.clone()
     simulation.ctrl += 0.3
     simulation.step(7)
@@ -151,10 +157,10 @@ def test_readings_are_current_after_a_reset():
     ],
 )
 def test_a_simulation_that_blows_up_is_found_and_no_other_is_touched(
-    name, value, tmp_path, monkeypatch
+    make_standing, name, value, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its log of warnings into the working directory
-    simulation, twin = _make_standing(3), _make_standing(3)
+    simulation, twin = make_standing(3), make_standing(3)
     getattr(simulation, name)[1, 1] = value
     simulation.step()
     twin.step()
@@ -199,6 +205,7 @@ class _BatchThatRaises:
 
 def test_an_engine_error_is_an_unstable_simulation_and_stops_nothing(monkeypatch):
     simulation, twin = _make_standing(), _make_standing()
+    assert isinstance(simulation, BatchSimulation)
     monkeypatch.setattr(simulation, "_batch", _BatchThatRaises(simulation._batch))
     simulation.step()
     twin.step()
@@ -208,8 +215,8 @@ def test_an_engine_error_is_an_unstable_simulation_and_stops_nothing(monkeypatch
     assert not simulation.unstable().any()
 
 
-def test_a_loaded_state_continues_bit_for_bit():
-    simulation = _make_standing()
+def test_a_loaded_state_continues_bit_for_bit(make_standing):
+    simulation = make_standing()
     simulation.field("geom_friction")[1, :, 0] = 0.3
     simulation.field("body_mass")[0, 1] += 1.0
     simulation.set_const()
@@ -217,15 +224,15 @@ def test_a_loaded_state_continues_bit_for_bit():
     simulation.step(9)
     state = simulation.state_dict()
     simulation.step(9)
-    twin = _make_standing()
+    twin = make_standing()
     twin.load_state_dict(state)
     twin.step(9)
     for index in range(2):
         _assert_same(_tensors(twin, index), _tensors(simulation, index))
 
 
-def test_a_saved_state_does_not_change_afterwards():
-    simulation = _make_standing()
+def test_a_saved_state_does_not_change_afterwards(make_standing):
+    simulation = make_standing()
     simulation.field("body_mass")
     state = simulation.state_dict()
     kept = {name: value.clone() for name, value in state.items()}
@@ -234,20 +241,16 @@ def test_a_saved_state_does_not_change_afterwards():
     assert all(torch.equal(state[name], value) for name, value in kept.items())
 
 
-def test_a_state_of_another_number_of_robots_is_refused():
+def test_a_state_of_another_number_of_robots_is_refused(make_standing):
     with pytest.raises(ValueError, match="num_envs"):
-        _make_standing(3).load_state_dict(_make_standing(2).state_dict())
+        make_standing(3).load_state_dict(make_standing(2).state_dict())
 
 
-def test_a_device_without_engine_is_refused():
-    with pytest.raises(ValueError, match="cuda"):
-        make_simulation(MODEL, 2, device="cuda")
-
-
+@pytest.mark.parametrize("engine", ["mjbatch", "warp"])
 @pytest.mark.parametrize("samples", [1, 4])
-def test_one_call_keeps_what_each_of_its_steps_read(samples):
+def test_one_call_keeps_what_each_of_its_steps_read(samples, engine):
     model = build_scene(SceneCfg(), foot_samples=samples)
-    single, several = (BatchSimulation(model, 2, num_threads=1) for _ in range(2))
+    single, several = (make_simulation(model, 2, num_threads=1, engine=engine) for _ in range(2))
     columns, kept, size = sensor_history(model, "FR_foot_vel", 4)
     assert (kept, size) == (samples, 3)
     past = several.history[:, columns].unflatten(1, (4, -1))[:, :, 2 + samples :]

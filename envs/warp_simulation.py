@@ -1,0 +1,272 @@
+"""MuJoCo Warp behind the protocol of `envs.simulation`: the same model, on a GPU.
+
+A physics step, a forward pass and a reset are graphs of kernels, captured after their first use and
+replayed from then on. torch reads and writes the engine's own arrays, so a control step copies
+nothing between device and host. Warp replays graphs on the CPU as well, and that is how the tests
+hold this engine to `mjbatch`; on a GPU it has not been run.
+
+Warp compiles kernels at their first use and keeps them in a cache of its own (`WARP_CACHE_PATH`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import mujoco
+import numpy as np
+import torch
+
+from envs.simulation import MAX_SPEED
+
+__all__ = ["WarpSimulation"]
+
+_STATE = (
+    "qpos",
+    "qvel",
+    "ctrl",
+    "qacc_warmstart",
+    "time",
+    "history",
+    "sensordata",
+    "actuator_force",
+    "overflow",
+)
+"""Arrays from which everything else follows, and readings that are older than they."""
+
+_DERIVED = ("body_subtreemass", "body_invweight0", "dof_invweight0")
+"""Model fields that follow from the masses, and differ between simulations when these do."""
+
+
+class WarpSimulation:
+    """MuJoCo Warp, see `Simulation`.
+
+    Physics runs in float32. A simulation that blows up stays as it is until it is reset. On a GPU
+    contacts are found in no fixed order, so that there, unlike on the CPU, no run repeats another
+    bit for bit.
+    """
+
+    def __init__(self, model: mujoco.MjModel, num_envs: int, device: str = "cpu") -> None:
+        """Allocate the simulations.
+
+        Args:
+            model: The compiled model.
+            num_envs: Number of simulations.
+            device: "cpu", "cuda" or "cuda:N".
+
+        Raises:
+            ValueError: If MuJoCo Warp is not installed, or there is no such device.
+        """
+        self._warp, self._engine = _load_packages()
+        self.model = model
+        self.num_envs = num_envs
+        self.device = _existing_device(device, self._warp)
+        with self._on_torch_stream():
+            self._model = self._engine.put_model(model)
+            self._set_options()
+            contacts, rows = _capacity(model, self._model.nxn_geom_pair_filtered.numpy())
+            self._data = self._engine.make_data(
+                model, nworld=num_envs, nconmax=contacts, njmax=rows
+            )
+            self._keyframes = self._warp.zeros(num_envs, dtype=int)
+        self._state = {name: self._view(getattr(self._data, name)) for name in _STATE}
+        self.qpos = self._state["qpos"]
+        self.qvel = self._state["qvel"]
+        self.ctrl = self._state["ctrl"]
+        self.sensordata = self._state["sensordata"]
+        self.actuator_force = self._state["actuator_force"]
+        self.history = self._state["history"]
+        self._fields: dict[str, torch.Tensor] = {}
+        self._graphs: dict[Callable[..., None], Any] = {}
+        overflow = self._engine.OverflowType
+        # `mjbatch` stops its solver at these limits, too; all others lose contacts or constraints.
+        self._harmless = int(overflow.ITERATIONS | overflow.LS_ITERATIONS)
+
+    def step(self, num_steps: int = 1) -> None:
+        """Advance every simulation by a number of physics steps."""
+        for _ in range(num_steps):
+            self._run(self._engine.step)
+
+    def forward(self, mask: torch.Tensor | None = None) -> None:
+        """Recompute everything that follows from the state. Mask shape: (num_envs,)."""
+        readings = (self.sensordata, self.actuator_force)
+        before = [reading.clone() for reading in readings]
+        history = self.history.clone()
+        self._run(self._engine.forward)
+        # MuJoCo Warp keeps a reading from every forward pass; MuJoCo, from steps alone.
+        self.history.copy_(history)
+        if mask is not None:
+            for reading, old in zip(readings, before, strict=True):
+                torch.where(mask.unsqueeze(1), reading, old, out=reading)
+
+    def reset(self, mask: torch.Tensor, keyframe: int = 0) -> None:
+        """Put the masked simulations to a keyframe. Mask shape: (num_envs,)."""
+        # A keyframe that does not exist leaves a simulation as it is.
+        self._view(self._keyframes).copy_(torch.where(mask, keyframe, -1))
+        self._run(self._engine.reset_data_keyframe, self._keyframes)
+        self.forward(mask)
+
+    def unstable(self) -> torch.Tensor:
+        """Return which simulations blew up since their last reset. Shape: (num_envs,)."""
+        # Negated, so that NaN counts as too far and too fast.
+        too_far = ~(self.qpos.abs().amax(dim=1) < mujoco.mjMAXVAL)
+        too_fast = ~(self.qvel.abs().amax(dim=1) < MAX_SPEED)
+        lost = (self._state["overflow"] & ~self._harmless) != 0
+        return too_far | too_fast | lost
+
+    def field(self, name: str) -> torch.Tensor:
+        """Return a model field per simulation, to be written. Shape: (num_envs, ...)."""
+        if name not in self._fields:
+            self._expand(self._model, name)
+            self._fields[name] = self._view(getattr(self._model, name))
+        return self._fields[name]
+
+    def set_const(self) -> None:
+        """Recompute the constants that depend on model fields, after writing these."""
+        for name in _DERIVED:
+            self._expand(self._model, name)
+        self._expand(self._model.stat, "meaninertia")
+        with self._on_torch_stream():
+            self._engine.set_const(self._model, self._data)
+
+    def state_dict(self) -> dict[str, torch.Tensor]:
+        """Return all that is needed to continue, on the CPU bit for bit."""
+        state = {f"field/{name}": value.clone() for name, value in self._fields.items()}
+        return state | {name: value.clone() for name, value in self._state.items()}
+
+    def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
+        """Continue from a `state_dict`.
+
+        Raises:
+            ValueError: If the state belongs to another engine, another model or another number of
+                simulations.
+        """
+        if "qacc_warmstart" not in state:
+            raise ValueError(
+                "simulation state is not of the engine 'warp': go on with the engine and the"
+                " device that it was saved with"
+            )
+        for name, own in self._state.items():
+            if state[name].shape != own.shape:
+                raise ValueError(
+                    f"simulation state's {name} has shape {tuple(state[name].shape)}, this model "
+                    f"and num_envs need {tuple(own.shape)}"
+                )
+        for key, value in state.items():
+            if key.startswith("field/"):
+                self.field(key.removeprefix("field/")).copy_(value)
+        self.set_const()
+        for name, own in self._state.items():
+            own.copy_(state[name])
+
+    def _set_options(self) -> None:
+        options = self._model.opt
+        options.warn_overflow = 0  # nothing is printed from the device: `unstable` tells
+        if self.device.type == "cuda":
+            # Drivers before CUDA 12.4 cannot end a solver's loop early inside a graph.
+            options.graph_conditional = self._warp.is_conditional_graph_supported()
+
+    def _expand(self, owner: Any, name: str) -> None:  # noqa: ANN401
+        """Give a field of the model a row for every simulation, in place of the common one."""
+        common = getattr(owner, name)
+        if common.shape[0] == self.num_envs:
+            return
+        if common.shape[0] != 1:
+            raise ValueError(f"model field {name!r} cannot differ between simulations")
+        with self._on_torch_stream():
+            row = self._view(common)
+            rows = row.expand(self.num_envs, *row.shape[1:]).contiguous()
+            setattr(owner, name, self._warp.from_torch(rows, dtype=common.dtype))
+        self._graphs.clear()  # they would go on with the old array
+
+    def _run(self, function: Callable[..., None], *args: Any) -> None:  # noqa: ANN401
+        """Call one of the engine's functions on all simulations, from its graph once it has one."""
+        if function in self._graphs:
+            self._warp.capture_launch(self._graphs[function], stream=self._torch_stream())
+            return
+        # The first call loads all kernels, which not every driver can do while it captures.
+        with self._on_torch_stream():
+            function(self._model, self._data, *args)
+        # On a stream of Warp's: CUDA captures nothing on the one that is torch's default.
+        with self._warp.ScopedDevice(str(self.device)), self._warp.ScopedCapture() as capture:
+            function(self._model, self._data, *args)
+        self._graphs[function] = capture.graph
+
+    def _torch_stream(self) -> Any:  # noqa: ANN401
+        """Return torch's current stream, on which the engine's work and torch's keep their order.
+
+        None on the CPU, which has no streams.
+        """
+        on_cuda = self.device.type == "cuda"
+        return self._warp.stream_from_torch(self.device) if on_cuda else None
+
+    @contextlib.contextmanager
+    def _on_torch_stream(self) -> Iterator[None]:
+        """Let Warp allocate and work on this simulation's device, in torch's order."""
+        with (
+            self._warp.ScopedDevice(str(self.device)),
+            self._warp.ScopedStream(self._torch_stream()),
+        ):
+            yield
+
+    def _view(self, array: Any) -> torch.Tensor:  # noqa: ANN401
+        """Return a tensor that shares an array's memory."""
+        return self._warp.to_torch(array)
+
+
+def _load_packages() -> tuple[Any, Any]:
+    """Return the modules `warp` and `mujoco_warp`, quiet on standard output.
+
+    Raises:
+        ValueError: If they are not installed.
+    """
+    try:
+        warp = importlib.import_module("warp")
+        warp.config.log_level = max(warp.config.log_level, warp.LOG_WARNING)
+        return warp, importlib.import_module("mujoco_warp")
+    except ImportError as error:
+        raise ValueError(
+            "the engine 'warp' needs the package mujoco_warp: pip install 'mute[gpu]', or let"
+            " the physics run on the CPU with env.engine 'mjbatch'"
+        ) from error
+
+
+def _existing_device(device: str, warp: Any) -> torch.device:  # noqa: ANN401
+    """Return a device that torch and Warp both have, with its number.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    asked = torch.device(device)
+    if asked.type == "cpu":
+        return asked
+    if asked.type != "cuda":
+        raise ValueError(f"simulation device must be 'cpu' or 'cuda', got {device!r}")
+    found = {"torch": torch.cuda.device_count(), "Warp": warp.get_cuda_device_count()}
+    for package, count in found.items():
+        if count <= (asked.index or 0):
+            raise ValueError(
+                f"simulation device is {device!r}, {package} sees {count} CUDA devices"
+            )
+    return asked if asked.index is not None else torch.device("cuda", torch.cuda.current_device())
+
+
+def _capacity(model: mujoco.MjModel, pairs: np.ndarray) -> tuple[int, int]:
+    """Return the contacts and the rows of constraints that a simulation can have at most.
+
+    Args:
+        model: The model.
+        pairs: Geoms that may touch. Shape: (num_pairs, 2).
+    """
+    kinds = mujoco.mjtGeom
+    most = np.full(kinds.mjNGEOMTYPES, 8)  # two boxes, or a box and a plane
+    most[kinds.mjGEOM_SPHERE], most[kinds.mjGEOM_CAPSULE] = 1, 2
+    types = model.geom_type[pairs]
+    contacts = most[types].min(axis=1)
+    contacts[(types == kinds.mjGEOM_HFIELD).any(axis=1)] = 4
+    num_contacts = max(1, int(contacts.sum()))
+    # A pyramidal contact without spin has 4 rows, an elliptic one 3. A row of dry friction a degree
+    # of freedom and one for each joint's limit come on top.
+    return num_contacts, 4 * num_contacts + model.nv + model.njnt

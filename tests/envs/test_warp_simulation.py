@@ -1,0 +1,154 @@
+"""Tests of the engine on MuJoCo Warp, beside the protocol's own in `test_simulation`.
+
+All run on the CPU, through the same graphs that a GPU would replay.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+
+import mujoco
+import numpy as np
+import pytest
+import torch
+
+from envs.randomization import RandomizationCfg, randomize_physics
+from envs.scene import SceneCfg, build_scene
+from envs.simulation import BatchSimulation, make_simulation
+from envs.warp_simulation import WarpSimulation
+
+MODEL = build_scene(SceneCfg(), foot_samples=4)
+
+
+def _make_standing(num_envs=2):
+    simulation = WarpSimulation(MODEL, num_envs)
+    simulation.reset(torch.ones(num_envs, dtype=torch.bool))
+    simulation.ctrl[:] = simulation.qpos[:, 7:]
+    return simulation
+
+
+def test_the_engine_follows_the_device_unless_it_is_named():
+    assert isinstance(make_simulation(MODEL, 1), BatchSimulation)
+    assert isinstance(make_simulation(MODEL, 1, engine="warp"), WarpSimulation)
+    assert isinstance(make_simulation(MODEL, 1, "cuda", engine="mjbatch"), BatchSimulation)
+
+
+@pytest.mark.parametrize("device", ["cuda", "cuda:1", "mps"])
+def test_a_device_that_is_not_there_is_refused(monkeypatch, device):
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
+    with pytest.raises(ValueError, match=device):
+        make_simulation(MODEL, 2, device=device)
+
+
+def test_without_the_package_one_line_says_what_to_install(monkeypatch):
+    def not_installed(name):
+        raise ImportError(name)
+
+    monkeypatch.setattr(importlib, "import_module", not_installed)
+    with pytest.raises(ValueError, match=r"pip install 'mute\[gpu\]'") as error:
+        WarpSimulation(MODEL, 1)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("engines", [("mjbatch", "warp"), ("warp", "mjbatch")])
+def test_a_state_of_the_other_engine_is_refused(engines):
+    one, other = (make_simulation(MODEL, 1, engine=engine) for engine in engines)
+    with pytest.raises(ValueError, match=f"not of the engine '{engines[0]}'"):
+        one.load_state_dict(other.state_dict())
+
+
+def test_tensors_are_the_engines_own_memory():
+    simulation = _make_standing()
+    for name in ("qpos", "qvel", "ctrl", "sensordata", "actuator_force", "history"):
+        tensor = getattr(simulation, name)
+        assert tensor.data_ptr() == getattr(simulation._data, name).ptr
+        assert tensor.dtype == torch.float32
+    assert simulation.field("body_mass").data_ptr() == simulation._model.body_mass.ptr
+
+
+def test_a_simulation_that_blew_up_stays_unstable_until_it_is_reset():
+    simulation = _make_standing()
+    simulation.qpos[0, 0] = math.nan
+    simulation.step(4)
+    assert simulation.unstable().tolist() == [True, False]
+    simulation.reset(torch.tensor([True, False]))
+    simulation.ctrl[0] = simulation.qpos[0, 7:]
+    simulation.step(4)
+    assert not simulation.unstable().any()
+
+
+def test_lost_contacts_make_a_simulation_unstable_and_a_solver_at_its_limit_does_not():
+    simulation = _make_standing(3)
+    overflow = importlib.import_module("mujoco_warp").OverflowType
+    flags = [overflow.NARROWPHASE, overflow.LS_ITERATIONS | overflow.ITERATIONS, overflow.NEFC]
+    simulation._state["overflow"][:] = torch.tensor([int(flag) for flag in flags])
+    assert simulation.unstable().tolist() == [True, False, True]
+    simulation.reset(simulation.unstable())
+    assert not simulation.unstable().any()
+
+
+def test_no_posture_has_more_contacts_than_there_is_room_for():
+    num_envs = 64
+    simulation = _make_standing(num_envs)
+    # Flat on the ground and into it, belly up, belly down and on every side.
+    generator = torch.Generator().manual_seed(0)
+    simulation.qpos[:, 2] = 0.04 * torch.rand(num_envs, generator=generator) - 0.02
+    simulation.qpos[:, 3:7] = torch.randn(num_envs, 4, generator=generator)
+    simulation.qpos[:, 3:7] /= simulation.qpos[:, 3:7].norm(dim=1, keepdim=True)
+    simulation.field("dof_frictionloss")[:] = 0.1
+    simulation.step()
+    data = simulation._data
+    contacts, rows = int(data.nacon.numpy()[0]), int(data.nefc.numpy().max())
+    assert 10 * num_envs < contacts <= data.naconmax
+    assert 60 < rows <= data.njmax
+    lost = simulation._state["overflow"] & ~simulation._harmless
+    assert (lost == 0).all()
+
+
+def test_a_field_that_comes_after_the_first_step_is_heeded():
+    simulation = _make_standing()
+    simulation.step()
+    simulation.field("actuator_gainprm")[0] = 0.0
+    simulation.field("actuator_biasprm")[0] = 0.0
+    simulation.ctrl += 0.1
+    simulation.step()
+    assert (simulation.actuator_force[0] == 0.0).all()
+    assert (simulation.actuator_force[1] > 1.0).all()
+
+
+def test_a_field_that_all_simulations_share_is_refused():
+    with pytest.raises(ValueError, match="geom_bodyid"):
+        WarpSimulation(MODEL, 2).field("geom_bodyid")
+
+
+def test_constants_follow_the_masses_as_mujoco_has_them():
+    simulation = _make_standing(3)
+    added = (0.0, 1.0, 3.0)
+    trunk = MODEL.body("trunk").id
+    simulation.field("body_mass")[:, trunk] += torch.tensor(added)
+    simulation.field("body_ipos")[:, trunk, 0] += 0.1 * torch.tensor(added)
+    simulation.set_const()
+    for index, mass in enumerate(added):
+        expected = build_scene(SceneCfg(), foot_samples=4)
+        expected.body_mass[trunk] += mass
+        expected.body_ipos[trunk, 0] += 0.1 * mass
+        mujoco.mj_setConst(expected, mujoco.MjData(expected))
+        for name in ("body_subtreemass", "body_invweight0", "dof_invweight0"):
+            value = getattr(simulation._model, name).numpy()[index]
+            np.testing.assert_allclose(value, getattr(expected, name), rtol=1e-4)
+        inertia = simulation._model.stat.meaninertia.numpy()[index]
+        assert inertia == pytest.approx(expected.stat.meaninertia, rel=1e-5)
+
+
+def test_both_engines_draw_the_same_physics():
+    engines = [make_simulation(MODEL, 4, engine=engine) for engine in ("mjbatch", "warp")]
+    generators = [torch.Generator().manual_seed(5) for _ in engines]
+    known = [
+        randomize_physics(simulation, RandomizationCfg(), generator)
+        for simulation, generator in zip(engines, generators, strict=True)
+    ]
+    assert torch.equal(*known)
+    for name in ("geom_friction", "body_mass", "body_inertia", "body_ipos", "actuator_gainprm"):
+        one, other = (simulation.field(name) for simulation in engines)
+        torch.testing.assert_close(one.float(), other.float())
