@@ -166,6 +166,11 @@ class LevelDetector:
         return self._decibels(self._state[:, 0] / self._decay)
 
     @property
+    def exposure(self) -> NDArray[np.float64]:
+        """Integral of the squares over time so far, signal unit squared s. Shape: (channels,)."""
+        return self._sum / self.sample_rate
+
+    @property
     def readings(self) -> NDArray[np.float64]:
         """Levels read at `reading_times`, dB. Shape: (channels, readings)."""
         none_yet = np.zeros((self.channels, 0))

@@ -13,9 +13,10 @@ import torch
 from scipy import stats
 
 from envs.quadruped_env import QuadrupedEnv
-from mute.acoustics.listener import HeardLevels, Listener
+from mute.acoustics.listener import Listener
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.soundscape import SOURCES
+from mute.acoustics.tally import HeardLevels
 from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
 from mute.evaluation.gait import Gait
