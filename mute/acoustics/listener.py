@@ -155,7 +155,8 @@ class Listener:
         )
         self._steps = 0
         self._age = np.zeros(self._count, dtype=np.int64)
-        self._kept = np.zeros((self._count, 0), dtype=bool)
+        self._kept_parts = [np.zeros((self._count, 0), dtype=bool)]
+        self._chosen = 0
         self._tally = Tally(self._count, list(self._energies.exposure))
         self._seconds = 0.0
 
@@ -182,7 +183,7 @@ class Listener:
     def levels(self) -> list[HeardLevels]:
         """Return the figures of each robot, without the last stretch until the listener is left."""
         self._add_up()
-        readings = zip(self._all_readings(), self._kept, strict=True)
+        readings = zip(self._all_readings(), self._kept(), strict=True)
         return self._tally.figures([own[kept] for own, kept in readings])
 
     def readings(self) -> NDArray[np.float64]:
@@ -190,7 +191,7 @@ class Listener:
 
         Shape: (robots, readings).
         """
-        return np.where(self._kept, self._all_readings(), math.nan)
+        return np.where(self._kept(), self._all_readings(), math.nan)
 
     def reading_times(self) -> NDArray[np.float64]:
         """Return the times of the readings since listening began, s. Shape: (readings,)."""
@@ -198,6 +199,10 @@ class Listener:
 
     def _all_readings(self) -> NDArray[np.float64]:
         return self._meter.detector.readings if self._steps else np.zeros((self._count, 0))
+
+    def _kept(self) -> NDArray[np.bool_]:
+        """Return which readings count. Shape: (robots, readings)."""
+        return np.concatenate(self._kept_parts, axis=1)
 
     def _work(self) -> None:
         """Measure, and write, what has been recorded since the last time."""
@@ -240,11 +245,11 @@ class Listener:
 
     def _choose_readings(self, ages: NDArray[np.int64]) -> None:
         """Tell which of the new readings count: those in steps of robots that are old enough."""
-        new = self._meter.detector.reading_times[self._kept.shape[1] :]
+        new = self._meter.detector.reading_times_from(self._chosen)
         # A reading at the end of a step is that step's.
         step = np.ceil(new / self._env.step_dt - 1e-6).astype(np.int64) - 1 - self._steps
-        kept = (ages >= self._read_steps)[step].T
-        self._kept = np.concatenate((self._kept, kept), axis=1)
+        self._kept_parts.append((ages >= self._read_steps)[step].T)
+        self._chosen += len(new)
 
     def _close_file(self, robot: int) -> None:
         file = self._files.pop(robot)

@@ -11,6 +11,7 @@ import torch
 
 from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
 from mute.acoustics.gains import load_gains
+from mute.acoustics.levels import LevelDetector
 from mute.acoustics.listener import SAMPLE_RATE, Listener
 from mute.acoustics.tally import HeardLevels
 from mute.acoustics.wav import read_wav
@@ -92,6 +93,21 @@ def test_a_reading_counts_once_robot_and_detector_have_settled_after_start_and_f
     before, after = times[kept[1]][:11], times[kept[1]][11:]
     assert before == pytest.approx(np.arange(20, 31) / 20)
     assert after == pytest.approx(np.arange(51, 61) / 20)
+
+
+def test_a_stretch_costs_the_same_however_long_the_walk_has_been(monkeypatch):
+    asked, from_number = [], LevelDetector.reading_times_from
+    monkeypatch.setattr(
+        LevelDetector,
+        "reading_times_from",
+        lambda detector, number: asked.append(len(new := from_number(detector, number))) or new,
+    )
+    env = _make_env()
+    listener = Listener(env, ["tile"], settle_time=SETTLE, from_energies=True, stretch=0.1)
+    with listener:
+        _walk(env, listener, 100)
+    assert asked == [0, 0, 0, 0, 1] + 15 * [2]  # a reading every 0.05 s, from 0.5 s on
+    assert listener.readings().shape == (2, 31)
 
 
 def test_the_equivalent_level_leaves_out_what_does_not_count():
