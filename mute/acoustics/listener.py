@@ -159,6 +159,7 @@ class Listener:
         self._chosen = 0
         self._tally = Tally(self._count, list(self._energies.exposure))
         self._seconds = 0.0
+        self._joint_work = np.zeros(self._count)
 
     def listen(self, dones: torch.Tensor) -> None:
         """Hear the control step that the environment has just made.
@@ -226,6 +227,7 @@ class Listener:
         pressure = self._render(block)
         self._energies.update(block)
         self._seconds += block.steps * block.timestep
+        self._joint_work += block.joint_power.sum(axis=(0, 2)) * block.timestep
         if isinstance(self._meter, SoundLevelMeter) and pressure is not None:
             self._meter.update(pressure)
         if pressure is not None and self._files:
@@ -241,7 +243,8 @@ class Listener:
         """Add what came since the last time to the tally of the robots for which it counts."""
         if self._seconds > 0.0:
             exposure = self._meter.detector.exposure
-            self._tally.take(self._seconds, exposure, self._energies.exposure)
+            sources = self._energies.exposure
+            self._tally.take(self._seconds, self._joint_work, exposure, sources)
 
     def _choose_readings(self, ages: NDArray[np.int64]) -> None:
         """Tell which of the new readings count: those in steps of robots that are old enough."""

@@ -29,6 +29,9 @@ class HeardLevels:
     silent."""
     seconds: float
     """The time that counts, s."""
+    power: float
+    """Mean over that time, and all its physics steps, of the sum over joints of |torque times
+    velocity|, W."""
 
 
 class Tally:
@@ -44,20 +47,23 @@ class Tally:
         self.counting = np.zeros(num_robots, dtype=bool)
         """Robots for which what comes counts; change it once all before is taken in."""
         self._sources = tuple(sources)
-        # Rows: time in s; exposure, in all and of each source, in Pa^2 s.
-        self._sums = np.zeros((2 + len(self._sources), num_robots))
+        # Rows: time in s; work in J; exposure, in all and of each source, in Pa^2 s.
+        self._sums = np.zeros((3 + len(self._sources), num_robots))
         self._taken = np.zeros_like(self._sums)
 
-    def take(self, seconds: float, exposure: NDArray, sources: Mapping[str, NDArray]) -> None:
+    def take(
+        self, seconds: float, work: NDArray, exposure: NDArray, sources: Mapping[str, NDArray]
+    ) -> None:
         """Take in what came since the last time, given what came in all.
 
         Args:
             seconds: Time, s.
+            work: Sum over joints of the integral of |torque times velocity|, J. Shape: (robots,).
             exposure: A-weighted sound exposure, Pa^2 s. Shape: (robots,).
             sources: That of each source. Shape of each: (robots,).
         """
         own = [sources[name] for name in self._sources]
-        totals = np.stack((np.full_like(exposure, seconds), exposure, *own))
+        totals = np.stack((np.full_like(exposure, seconds), work, exposure, *own))
         self._sums += np.where(self.counting, totals - self._taken, 0.0)
         self._taken = totals
 
@@ -73,7 +79,7 @@ class Tally:
         ]
 
     def _of_one(self, readings: NDArray, sums: Sequence[float]) -> HeardLevels:
-        seconds, *exposures = sums
+        seconds, work, *exposures = sums
         laeq, *sources = (_level(exposure, seconds) for exposure in exposures)
         return HeardLevels(
             mnl=float(readings.mean()) if len(readings) else math.nan,
@@ -81,6 +87,7 @@ class Tally:
             laeq=laeq,
             sources=dict(zip(self._sources, sources, strict=True)),
             seconds=seconds,
+            power=work / seconds if seconds > 0.0 else math.nan,
         )
 
 

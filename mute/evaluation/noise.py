@@ -97,7 +97,7 @@ class NoiseRow:
     stride_frequency: float
     """Landings of a foot per second, Hz."""
     power: float
-    """Mechanical power of the joints, W."""
+    """Mean over all physics steps of the sum over joints of |torque times velocity|, W."""
     cost_of_transport: float
     """Power over weight times actual speed."""
     fall_rate: float
@@ -201,7 +201,8 @@ def _row(
 ) -> NoiseRow:
     mnl, mnl_std, mnl_ci95 = _spread([trial.mnl for trial in levels])
     pnl, pnl_std, pnl_ci95 = _spread([trial.pnl for trial in levels])
-    own = asdict(gait)
+    power = _mean_power(levels)
+    own = asdict(gait) | {"power": power}
     shared = {name: own[name] for name in NoiseRow.__dataclass_fields__ if name in own}
     return NoiseRow(
         method=method,
@@ -221,9 +222,17 @@ def _row(
             for name in SOURCES
         },
         speed_mean=gait.speed,
-        cost_of_transport=gait.power / (weight * gait.speed) if gait.speed > 0.0 else float("nan"),
+        cost_of_transport=power / (weight * gait.speed) if gait.speed > 0.0 else float("nan"),
         **shared,
     )
+
+
+def _mean_power(levels: Sequence[HeardLevels]) -> float:
+    """Return the power over the time of all trials together, W; NaN where none counts."""
+    counted = [trial for trial in levels if trial.seconds > 0.0]
+    seconds = sum(trial.seconds for trial in counted)
+    work = sum(trial.power * trial.seconds for trial in counted)
+    return work / seconds if counted else float("nan")
 
 
 def _spread(values: Sequence[float]) -> tuple[float, float, float]:

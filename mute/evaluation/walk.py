@@ -117,7 +117,7 @@ class Walk:
     floors: tuple[FloorLevel, ...]
     """Levels by floor, in the order in which they were met."""
     gait: Gait
-    """How it walked."""
+    """How it walked; the power is that of every physics step."""
     track: Track
     """Place and level over time."""
 
@@ -252,7 +252,7 @@ def follow_course(
         pnl=levels.pnl,
         laeq=levels.laeq,
         floors=_by_floor(track),
-        gait=session.gait(),
+        gait=dataclasses.replace(session.gait(), power=levels.power),
         track=track,
     )
 

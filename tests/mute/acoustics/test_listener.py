@@ -110,6 +110,27 @@ def test_a_stretch_costs_the_same_however_long_the_walk_has_been(monkeypatch):
     assert listener.readings().shape == (2, 31)
 
 
+def test_the_power_is_the_integral_over_the_physics_steps_that_count():
+    env = _make_env()
+    listener = Listener(env, ["tile"], settle_time=SETTLE, from_energies=True)
+    record, powers = env.on_physics_step, []
+    assert record is not None
+
+    def record_both() -> None:
+        record()
+        torque, velocity = env.simulation.actuator_force, env.simulation.qvel[:, 6:]
+        powers.append((torque * velocity).abs().sum(dim=1).tolist())
+
+    env.on_physics_step = record_both
+    with listener:
+        _walk(env, listener, 100, upset=50)
+    first, second = np.array(powers).T
+    settle = round(SETTLE * 1000)
+    whole = [first[settle:], np.append(second[settle:1000], second[1020 + settle :])]
+    power = [levels.power for levels in listener.levels()]
+    assert power == pytest.approx([own.mean() for own in whole], rel=1e-4)
+
+
 def test_the_equivalent_level_leaves_out_what_does_not_count():
     env = _make_env()
     listener = Listener(env, ["tile"], settle_time=SETTLE, sources=("fan",), from_energies=True)
