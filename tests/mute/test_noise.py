@@ -11,6 +11,7 @@ import pytest
 import torch
 from scipy import stats
 
+from mute import card
 from mute.acoustics import listener
 from mute.acoustics.calibration import fit_gain
 from mute.acoustics.fan import FAN_LEVEL
@@ -18,9 +19,11 @@ from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.soundscape import SOURCES
+from mute.acoustics.tally import HeardLevels
 from mute.command_lines.arguments import REPOSITORY
 from mute.controllers import load_policy
 from mute.errors import MuteError
+from mute.evaluation import noise
 from mute.evaluation.noise import NoiseRow, NoiseSetting, measure_noise
 from mute.evaluation.noise_probe import NoiseProbe
 from mute.evaluation.recordings import Recordings
@@ -79,6 +82,58 @@ def test_a_source_that_is_not_heard_has_no_level():
     (row,) = _measure(seed=1, trials=1, seconds=0.5, sources=("drive",), from_energies=True)[:1]
     assert math.isnan(row.laeq_impacts)
     assert row.laeq_drive == pytest.approx(row.laeq_mean, abs=1e-6)
+
+
+def _heard(mnl: float, impacts: float = 60.0, seconds: float = 2.0) -> HeardLevels:
+    return HeardLevels(mnl, mnl + 4.0, mnl + 1.0, {"impacts": impacts}, seconds, power=25.0)
+
+
+def _row_of(monkeypatch, levels: list[HeardLevels]) -> NoiseRow:
+    monkeypatch.setattr(noise.Listener, "levels", lambda _: levels)
+    return _measure(seed=1, trials=len(levels) // 2, seconds=0.02, from_energies=True)[0]
+
+
+def test_a_trial_without_a_level_leaves_the_others_theirs(monkeypatch):
+    mute = HeardLevels(math.nan, math.nan, math.nan, {"impacts": math.nan}, 0.0, math.nan)
+    row = _row_of(monkeypatch, [_heard(68.0), _heard(68.2), mute, _heard(68.1)] * 2)
+    assert (row.trials, row.trials_heard) == (4, 3)
+    assert row.mnl_mean == pytest.approx(68.1)
+    assert row.pnl_mean == pytest.approx(72.1)
+    assert row.laeq_mean == pytest.approx(69.1)
+    assert row.mnl_std == pytest.approx(0.1)
+    assert row.mnl_ci95 == pytest.approx(4.303 * 0.1 / 3**0.5, rel=1e-3)  # t of 2 degrees
+    assert row.power == 25.0
+
+
+def test_a_source_that_is_silent_in_one_trial_keeps_the_level_of_the_others_energy(monkeypatch):
+    row = _row_of(monkeypatch, [_heard(60.0, 60.0), _heard(60.0, -math.inf)] * 2)
+    assert row.laeq_impacts == pytest.approx(60.0 - 3.01, abs=0.01)
+    assert math.isnan(row.laeq_fan)  # not among what is heard
+
+
+def test_a_setting_of_which_nothing_is_heard_has_no_level(monkeypatch):
+    mute = HeardLevels(math.nan, math.nan, math.nan, {"impacts": math.nan}, 0.0, math.nan)
+    row = _row_of(monkeypatch, [mute, mute])
+    assert row.trials_heard == 0
+    assert all(math.isnan(value) for value in (row.mnl_mean, row.pnl_mean, row.laeq_impacts))
+    assert math.isnan(row.power)
+
+
+def test_power_is_the_work_of_all_trials_over_their_time(monkeypatch):
+    half = dataclasses.replace(_heard(60.0), seconds=1.0, power=10.0)
+    assert _row_of(monkeypatch, [half, _heard(60.0)] * 2).power == pytest.approx(20.0)
+
+
+def test_the_card_tells_levels_without_spread_and_how_many_trials_have_one(tmp_path, capsys):
+    rows = json.loads((REPOSITORY / "docs" / "noise" / "noise.json").read_text())
+    rows[0] |= {"trials_heard": 1, "mnl_mean": 68.0, "mnl_std": None}
+    rows[1] |= {"trials_heard": 0, "mnl_mean": None, "mnl_std": None}
+    path = tmp_path / "noise.json"
+    path.write_text(json.dumps(rows))
+    card.main(["--noise", str(path)])
+    shown = capsys.readouterr().out
+    assert "| wood | 0 | 68.0 (1 of 5 trials) |" in shown
+    assert "| wood | 1 | - |" in shown
 
 
 def test_a_probe_of_a_training_is_near_the_table_and_draws_no_random_number(rows):
