@@ -23,6 +23,7 @@ from mute.errors import MuteError
 from mute.evaluation.course import Course, FloorArea
 from mute.evaluation.recordings import Recordings
 from mute.evaluation.walk import Walk, follow_course, make_walk_env, time_limit
+from mute.provenance import sound_origin
 from mute.session import Session
 
 POLICY = REPOSITORY / "resources" / "go1" / "go1_mute.pt"
@@ -189,6 +190,8 @@ def test_the_command_writes_figures_track_map_and_sound(tmp_path, capsys):
     content = json.loads((out / "walk.json").read_text())
     assert content["end"] == "arrived"
     assert content["beta"] == 0.0
+    assert content["iteration"] == 400
+    assert content.items() >= sound_origin(POLICY).items()
     assert content["mnl"] < content["pnl"]
     with (out / "track.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
