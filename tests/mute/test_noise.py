@@ -12,7 +12,7 @@ import torch
 from scipy import stats
 
 from mute import card
-from mute.acoustics import listener
+from mute.acoustics import calibration, listener
 from mute.acoustics.calibration import fit_gain
 from mute.acoustics.fan import FAN_LEVEL
 from mute.acoustics.floors import FLOORS
@@ -26,6 +26,7 @@ from mute.errors import MuteError
 from mute.evaluation import noise
 from mute.evaluation.noise import NoiseRow, NoiseSetting, measure_noise
 from mute.evaluation.noise_probe import NoiseProbe
+from mute.evaluation.paper_levels import PAPER_LEVELS
 from mute.evaluation.recordings import Recordings
 
 
@@ -42,6 +43,11 @@ def rows() -> list[NoiseRow]:
 
 def test_the_same_seed_gives_the_same_table(rows):
     assert _measure(seed=1) == rows
+
+
+def test_the_gain_that_ships_gives_the_level_that_it_was_fitted_to(rows):
+    mnl, _ = PAPER_LEVELS["mute beta 0"]["wood"]
+    assert rows[0].mnl_mean == pytest.approx(mnl, abs=0.5)
 
 
 def test_a_policy_compared_with_itself_differs_by_less_than_its_confidence_interval(rows):
@@ -195,6 +201,20 @@ def test_the_shipped_calibration_has_every_floor_and_where_it_comes_from():
         if "target_mnl" in floor:
             assert floor["mnl"] == pytest.approx(floor["target_mnl"], abs=0.02)
     assert content["command"].startswith("python -m mute.acoustics.calibration ")
+
+
+def test_a_calibration_reaches_the_papers_levels_and_is_near_the_one_that_ships(tmp_path):
+    out = tmp_path / "gains.json"
+    assert calibration.main(["--trials", "1", "--seconds", "2", "--out", str(out)]) == 0
+    content, shipped = json.loads(out.read_text()), load_gains()
+    for name, (mnl, _) in PAPER_LEVELS["mute beta 0"].items():
+        row = content["floors"][name]
+        assert row["target_mnl"] == mnl == pytest.approx(row["mnl"], abs=0.02)
+        assert row["mnl"] < row["pnl"] < row["mnl"] + 8.0
+    for name, gain in load_gains(out).items():  # one robot for 2 s is not five for 10 s
+        assert 20.0 * math.log10(gain / shipped[name]) == pytest.approx(0.0, abs=1.0)
+    assert "--trials 1 --seconds 2 " in content["command"]
+    assert content["policy"]["iteration"] == 400
 
 
 @pytest.mark.parametrize(
