@@ -23,7 +23,7 @@ from mute.acoustics.tally import HeardLevels
 from mute.command_lines.arguments import REPOSITORY
 from mute.controllers import load_policy
 from mute.errors import MuteError
-from mute.evaluation import noise
+from mute.evaluation import noise, noise_probe
 from mute.evaluation.noise import NoiseRow, NoiseSetting, measure_noise
 from mute.evaluation.noise_probe import NoiseProbe
 from mute.evaluation.paper_levels import PAPER_LEVELS
@@ -149,6 +149,26 @@ def test_a_probe_of_a_training_is_near_the_table_and_draws_no_random_number(rows
     assert torch.equal(torch.get_rng_state(), before)
     expected = {f"Noise/level_beta_{row.beta:g}": row.mnl_mean for row in rows}
     assert levels == pytest.approx(expected, abs=1.0)
+
+
+def test_a_training_that_measures_no_noise_needs_no_calibration(monkeypatch):
+    def fail() -> None:
+        raise MuteError("no calibration")
+
+    policy = load_policy(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
+    monkeypatch.setattr(noise_probe, "load_gains", fail)
+    probe = NoiseProbe()
+    with pytest.raises(MuteError, match="no calibration"):
+        probe.measure(policy)
+
+
+def test_a_probe_leaves_out_the_robots_that_keep_falling(monkeypatch):
+    mute = HeardLevels(math.nan, math.nan, math.nan, {}, 0.0, math.nan)
+    levels = [_heard(68.0), mute, _heard(69.0), mute, mute, mute, mute, mute]
+    monkeypatch.setattr(noise.Listener, "levels", lambda _: levels)
+    monkeypatch.setattr(noise_probe, "_SECONDS", 0.02)
+    policy = load_policy(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
+    assert NoiseProbe().measure(policy) == {"Noise/level_beta_0": pytest.approx(68.5)}
 
 
 def test_a_policy_that_acts_between_the_physics_steps_has_no_level():
