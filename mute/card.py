@@ -137,11 +137,26 @@ def _noise_row(row: Mapping[str, Any]) -> dict[str, Any]:
     measured = PAPER_LEVELS.get(f"mute beta {row['beta']:g}", {}).get(row["surface"])
     return {
         **row,
-        "mnl": f"{row['mnl_mean']:.1f} +- {row['mnl_std']:.1f}",
-        "pnl": f"{row['pnl_mean']:.1f} +- {row['pnl_std']:.1f}",
+        "mnl": _spread(row, "mnl"),
+        "pnl": _spread(row, "pnl"),
         "paper": None if measured is None else f"{measured[0]:.1f}, {measured[1]:.1f}",
         "apex_cm": _times(row["apex_mean"], 100.0),
     }
+
+
+def _spread(row: Mapping[str, Any], name: str) -> str | None:
+    """Return a level with its spread, where it has one, and from how many trials if not from all.
+
+    Args:
+        row: A row of `evaluate.py noise`.
+        name: Of the level.
+    """
+    mean, deviation = row[f"{name}_mean"], row[f"{name}_std"]
+    if mean is None:
+        return None
+    level = f"{mean:.1f}" if deviation is None else f"{mean:.1f} +- {deviation:.1f}"
+    heard = row.get("trials_heard", row["trials"])
+    return level if heard == row["trials"] else f"{level} ({heard} of {row['trials']} trials)"
 
 
 def _times(value: float | None, factor: float) -> float | None:

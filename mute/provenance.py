@@ -1,28 +1,65 @@
-"""Where a figure or a policy comes from: the commit and the kind of machine."""
+"""Where a figure or a policy comes from: the commit, the files that went in, and the machine."""
 
 from __future__ import annotations
 
+import hashlib
+import os
 import platform
 from pathlib import Path
 
 import git
 import torch
 
+from mute.acoustics.gains import GAINS_FILE
+from mute.errors import MuteError
 from mute.threads import usable_cores
 
-__all__ = ["current_commit", "machine_kind"]
+__all__ = ["current_commit", "file_sha256", "machine_kind", "sound_origin"]
 
 _REPOSITORY = Path(__file__).resolve().parents[1]
 
 
 def current_commit() -> str:
-    """Return the commit of the working tree, with '-dirty' if it differs; 'unknown' outside git."""
+    """Return the commit of the working tree, with '-dirty' if it differs; 'unknown' outside git.
+
+    Files in `docs`, where results are written one after the other, may differ: no result depends on
+    them.
+    """
     try:
         repository = git.Repo(_REPOSITORY)
-        suffix = "-dirty" if repository.is_dirty() else ""
+        suffix = "-dirty" if repository.is_dirty(path=":(exclude)docs") else ""
         return f"{repository.head.commit.hexsha}{suffix}"
     except (git.GitError, ValueError):
         return "unknown"
+
+
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of a file, in hexadecimal.
+
+    Raises:
+        MuteError: If it cannot be read.
+    """
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise MuteError(f"cannot read {path}: {error.strerror}") from error
+
+
+def sound_origin(policy: Path) -> dict[str, str]:
+    """Return what modelled levels rest on, as plain data: policy, gains, commit and machine.
+
+    Ask before measuring: a file may be replaced while that runs.
+
+    Raises:
+        MuteError: If the policy or the calibration cannot be read.
+    """
+    return {
+        "policy": os.path.relpath(policy, _REPOSITORY),
+        "policy_sha256": file_sha256(policy),
+        "calibration_sha256": file_sha256(GAINS_FILE),
+        "commit": current_commit(),
+        "machine": machine_kind(),
+    }
 
 
 def machine_kind() -> str:

@@ -8,7 +8,6 @@ other speeds, other policies) is a prediction.
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 import shlex
@@ -45,7 +44,7 @@ from mute.evaluation.noise import SETTLE_TIME
 from mute.evaluation.paper_levels import PAPER_LEVELS
 from mute.evaluation.tables import print_table, write_json
 from mute.evaluation.trials import evaluation_cfg, run_trial
-from mute.provenance import current_commit, machine_kind
+from mute.provenance import current_commit, file_sha256, machine_kind
 from mute.tasks import DEFAULT_TASK
 
 __all__ = ["CalibrationArgs", "fit_gain", "main", "provenance"]
@@ -130,7 +129,7 @@ def provenance(args: CalibrationArgs, policy: Policy) -> dict[str, Any]:
             "task": policy.task,
             "iteration": policy.iteration,
             "beta": 0.0,
-            "sha256": hashlib.sha256(args.policy.read_bytes()).hexdigest(),
+            "sha256": file_sha256(args.policy),
         },
         "commit": current_commit(),
         "machine": machine_kind(),

@@ -1,7 +1,7 @@
 """Levels without audio: the A-weighted energies of the sources, added up at the physics rate.
 
-The cheap path for training curves and long walks. It knows the same sources as `soundscape`, and
-gives what a sound level meter would read at its microphone, from energies alone:
+The cheap path for training curves and levels that are shown live. It knows the same sources as
+`soundscape`, and gives what a sound level meter would read at its microphone, from energies alone:
 
 - a landing deposits the A-weighted sound exposure of its response, which goes with the squares of
   speed, mass and 1/r, and with the contact time through a table made once for each floor;

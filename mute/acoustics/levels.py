@@ -133,6 +133,7 @@ class LevelDetector:
         self._sum = np.zeros(channels)
         self._max = np.zeros(channels)
         self._readings: list[NDArray[np.float64]] = []
+        self._reading_count = 0
 
     def update(self, squares: NDArray) -> None:
         """Take the next squares; any lengths of blocks give the same figures.
@@ -157,13 +158,20 @@ class LevelDetector:
         self._state = state
         self._sum += squares.sum(axis=-1)
         np.maximum(self._max, detected.max(axis=-1), out=self._max)
-        self._readings.append(detected[:, self._reading_indices(squares.shape[1])])
+        read = detected[:, self._reading_indices(squares.shape[1])]
+        self._readings.append(read)
+        self._reading_count += read.shape[1]
         self._samples += squares.shape[1]
 
     @property
     def level(self) -> NDArray[np.float64]:
         """What the detector shows now, dB. Shape: (channels,)."""
         return self._decibels(self._state[:, 0] / self._decay)
+
+    @property
+    def exposure(self) -> NDArray[np.float64]:
+        """Integral of the squares over time so far, signal unit squared s. Shape: (channels,)."""
+        return self._sum / self.sample_rate
 
     @property
     def readings(self) -> NDArray[np.float64]:
@@ -174,8 +182,15 @@ class LevelDetector:
     @property
     def reading_times(self) -> NDArray[np.float64]:
         """Times of the readings since the start, s. Shape: (readings,)."""
-        count = sum(block.shape[1] for block in self._readings)
-        return (self._first_reading + np.arange(count)) / READINGS_PER_SECOND
+        return self.reading_times_from(0)
+
+    def reading_times_from(self, number: int) -> NDArray[np.float64]:
+        """Return the times of the readings from a number on, s; the first has the number 0.
+
+        It takes no longer after many readings than after few.
+        """
+        numbers = np.arange(number, self._reading_count)
+        return (self._first_reading + numbers) / READINGS_PER_SECOND
 
     def result(self) -> list[Levels]:
         """Return the figures of what came so far, one for each channel.

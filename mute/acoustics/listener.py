@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
@@ -23,15 +22,15 @@ from numpy.typing import NDArray
 from envs.quadruped_env import QuadrupedEnv
 from mute.acoustics.contacts import ContactBlock
 from mute.acoustics.energy import EnergyMeter
-from mute.acoustics.levels import P_REF, settling_time
+from mute.acoustics.levels import settling_time
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.recorder import FloorAt, Recorder
 from mute.acoustics.sound_level_meter import SoundLevelMeter
 from mute.acoustics.soundscape import SOURCES, Soundscape
-from mute.acoustics.wav import PCM, WavFormat, wav_header
-from mute.errors import MuteError
+from mute.acoustics.tally import HeardLevels, Tally
+from mute.acoustics.wav_file import WavFile
 
-__all__ = ["SAMPLE_RATE", "WAV_FULL_SCALE", "HeardLevels", "Listener", "WavFile"]
+__all__ = ["SAMPLE_RATE", "WAV_FULL_SCALE", "Listener"]
 
 SAMPLE_RATE = 48000
 """Of all sound that is made here, Hz."""
@@ -39,24 +38,6 @@ SAMPLE_RATE = 48000
 WAV_FULL_SCALE = 4.0
 """Sound pressure of a full-scale sample in a WAV file, Pa. Always the same, so that a quiet walk
 sounds quiet beside a loud one; 4 Pa is a peak of 106 dB."""
-
-_LONGEST_FILE = 43200 * SAMPLE_RATE
-"""Samples at which a file ends though the walk goes on: a WAV file holds 4 GiB, 12 hours."""
-
-
-@dataclass(frozen=True)
-class HeardLevels:
-    """Figures of one robot over the time that counts, dBA re 20 uPa; NaN where there was none."""
-
-    mnl: float
-    """Mean of the readings."""
-    pnl: float
-    """Largest reading."""
-    laeq: float
-    """Level of the mean square."""
-    sources: Mapping[str, float]
-    """Level of the mean square of each source that is heard, from `EnergyMeter`; -inf where it is
-    silent."""
 
 
 class Listener:
@@ -141,7 +122,7 @@ class Listener:
         """
         with contextlib.ExitStack() as opened:
             for robot, path in self._paths.items():
-                self._files[robot] = WavFile(path)
+                self._files[robot] = WavFile(path, SAMPLE_RATE, WAV_FULL_SCALE)
                 opened.callback(self._close_file, robot)
             self._closing = opened.pop_all()
         return self
@@ -174,12 +155,11 @@ class Listener:
         )
         self._steps = 0
         self._age = np.zeros(self._count, dtype=np.int64)
-        self._kept = np.zeros((self._count, 0), dtype=bool)
-        self._counting = np.zeros(self._count, dtype=bool)
-        # Rows: time in s; exposure, in all and of each source, in the square of the reference
-        # pressure times s.
-        self._tally = np.zeros((2 + len(self._energies.exposure), self._count))
-        self._tallied = np.zeros_like(self._tally)
+        self._kept_parts = [np.zeros((self._count, 0), dtype=bool)]
+        self._chosen = 0
+        self._tally = Tally(self._count, list(self._energies.exposure))
+        self._seconds = 0.0
+        self._joint_work = np.zeros(self._count)
 
     def listen(self, dones: torch.Tensor) -> None:
         """Hear the control step that the environment has just made.
@@ -204,15 +184,15 @@ class Listener:
     def levels(self) -> list[HeardLevels]:
         """Return the figures of each robot, without the last stretch until the listener is left."""
         self._add_up()
-        kept = (row[kept] for row, kept in zip(self._all_readings(), self._kept, strict=True))
-        return [self._figures(own, tally) for own, tally in zip(kept, self._tally.T, strict=True)]
+        readings = zip(self._all_readings(), self._kept(), strict=True)
+        return self._tally.figures([own[kept] for own, kept in readings])
 
     def readings(self) -> NDArray[np.float64]:
         """Return the Fast levels at `reading_times`, dBA; NaN where they are in no figure.
 
         Shape: (robots, readings).
         """
-        return np.where(self._kept, self._all_readings(), math.nan)
+        return np.where(self._kept(), self._all_readings(), math.nan)
 
     def reading_times(self) -> NDArray[np.float64]:
         """Return the times of the readings since listening began, s. Shape: (readings,)."""
@@ -220,6 +200,10 @@ class Listener:
 
     def _all_readings(self) -> NDArray[np.float64]:
         return self._meter.detector.readings if self._steps else np.zeros((self._count, 0))
+
+    def _kept(self) -> NDArray[np.bool_]:
+        """Return which readings count. Shape: (robots, readings)."""
+        return np.concatenate(self._kept_parts, axis=1)
 
     def _work(self) -> None:
         """Measure, and write, what has been recorded since the last time."""
@@ -232,9 +216,9 @@ class Listener:
         changes = np.flatnonzero((counts[1:] != counts[:-1]).any(axis=1)) + 1
         length = block.steps // len(ages)
         for first, stop in pairwise([0, *changes.tolist(), len(ages)]):
-            if not np.array_equal(counts[first], self._counting):
+            if not np.array_equal(counts[first], self._tally.counting):
                 self._add_up()
-                self._counting = counts[first]
+                self._tally.counting = counts[first]
             self._hear(block.part(first * length, stop * length))
         self._choose_readings(ages)
         self._steps += len(ages)
@@ -242,6 +226,8 @@ class Listener:
     def _hear(self, block: ContactBlock) -> None:
         pressure = self._render(block)
         self._energies.update(block)
+        self._seconds += block.steps * block.timestep
+        self._joint_work += block.joint_power.sum(axis=(0, 2)) * block.timestep
         if isinstance(self._meter, SoundLevelMeter) and pressure is not None:
             self._meter.update(pressure)
         if pressure is not None and self._files:
@@ -255,97 +241,20 @@ class Listener:
 
     def _add_up(self) -> None:
         """Add what came since the last time to the tally of the robots for which it counts."""
-        try:
-            results = self._meter.result()
-        except ValueError:  # nothing came
-            return
-        seconds = np.array([levels.seconds for levels in results])
-        exposure = 10.0 ** (0.1 * np.array([levels.laeq for levels in results])) * seconds
-        sources = [own / P_REF**2 for own in self._energies.exposure.values()]
-        totals = np.stack((seconds, exposure, *sources))
-        self._tally += np.where(self._counting, totals - self._tallied, 0.0)
-        self._tallied = totals
-
-    def _figures(self, readings: NDArray, tally: NDArray) -> HeardLevels:
-        """Return a robot's figures from its readings that count and its column of the tally."""
-        seconds, *exposures = tally.tolist()
-        laeq, *sources = (
-            _decibels(exposure / seconds) if seconds > 0.0 else math.nan for exposure in exposures
-        )
-        return HeardLevels(
-            mnl=float(readings.mean()) if len(readings) else math.nan,
-            pnl=float(readings.max()) if len(readings) else math.nan,
-            laeq=laeq,
-            sources=dict(zip(self._energies.exposure, sources, strict=True)),
-        )
+        if self._seconds > 0.0:
+            exposure = self._meter.detector.exposure
+            sources = self._energies.exposure
+            self._tally.take(self._seconds, self._joint_work, exposure, sources)
 
     def _choose_readings(self, ages: NDArray[np.int64]) -> None:
         """Tell which of the new readings count: those in steps of robots that are old enough."""
-        new = self._meter.detector.reading_times[self._kept.shape[1] :]
+        new = self._meter.detector.reading_times_from(self._chosen)
         # A reading at the end of a step is that step's.
         step = np.ceil(new / self._env.step_dt - 1e-6).astype(np.int64) - 1 - self._steps
-        kept = (ages >= self._read_steps)[step].T
-        self._kept = np.concatenate((self._kept, kept), axis=1)
+        self._kept_parts.append((ages >= self._read_steps)[step].T)
+        self._chosen += len(new)
 
     def _close_file(self, robot: int) -> None:
         file = self._files.pop(robot)
         file.close()
         self.clipped[robot] = file.clipped
-
-
-class WavFile:
-    """A mono WAV file of 16 bits that grows as samples come; what came is whole after `close`."""
-
-    def __init__(self, path: Path) -> None:
-        """Open the file.
-
-        Raises:
-            MuteError: If it cannot be written.
-        """
-        self.path = path
-        self.clipped = 0
-        """Samples beyond full scale, cut off."""
-        self._samples = 0
-        with self._told():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = path.open("wb")
-            self._file.write(self._header())
-
-    def write(self, pressure: NDArray) -> None:
-        """Append samples in Pa, up to the longest that a file can be. Shape: (samples,).
-
-        Raises:
-            MuteError: If they cannot be written.
-        """
-        pressure = pressure[: _LONGEST_FILE - self._samples]
-        self._samples += len(pressure)
-        scaled = np.rint(pressure * (32767.0 / WAV_FULL_SCALE))
-        self.clipped += int(np.count_nonzero(np.abs(scaled) > 32767.0))
-        with self._told():
-            self._file.write(np.clip(scaled, -32767.0, 32767.0).astype("<i2").tobytes())
-
-    def close(self) -> None:
-        """Complete the file.
-
-        Raises:
-            MuteError: If it cannot be written.
-        """
-        # Not with `wave`, which would leave a traceback behind where the file cannot be completed.
-        with self._told(), self._file:
-            self._file.seek(0)
-            self._file.write(self._header())
-
-    def _header(self) -> bytes:
-        return wav_header(WavFormat(PCM, 1, SAMPLE_RATE, 16, 16), 2 * self._samples)
-
-    @contextlib.contextmanager
-    def _told(self) -> Iterator[None]:
-        """Turn what the system says of the file into one line."""
-        try:
-            yield
-        except OSError as error:
-            raise MuteError(f"cannot write {self.path}: {error.strerror}") from error
-
-
-def _decibels(ratio: float) -> float:
-    return 10.0 * math.log10(ratio) if ratio > 0.0 else -math.inf

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,7 +36,7 @@ from mute.errors import MuteError
 from mute.evaluation.noise import SETTLE_TIME, NoiseRow, NoiseSetting, measure_noise
 from mute.evaluation.recordings import Recordings
 from mute.evaluation.tables import print_table, write_csv, write_json
-from mute.provenance import machine_kind
+from mute.provenance import sound_origin
 from mute.tasks import DEFAULT_TASK
 
 __all__ = ["NoiseArgs", "SweepBetaArgs", "SweepSpeedArgs", "noise", "sweep_beta", "sweep_speed"]
@@ -179,8 +178,9 @@ def _run(
         Recordings(wav, video, tell)
         for wav, video in zip(_files(args.wav, labels), _files(args.video, labels), strict=True)
     ]
+    origin = sound_origin(args.policy)
     rows = _measure(name, args, surfaces, settings, kept)
-    _report(name, args, rows, draw)
+    _report(name, args, rows, origin, draw)
 
 
 def _measure(
@@ -245,7 +245,11 @@ def _files(path: Path | None, labels: Sequence[Sequence[str]]) -> list[dict[int,
 
 
 def _report(
-    name: str, args: _CommonArgs, rows: Sequence[NoiseRow], draw: _Draw | None = None
+    name: str,
+    args: _CommonArgs,
+    rows: Sequence[NoiseRow],
+    origin: Mapping[str, str],
+    draw: _Draw | None = None,
 ) -> None:
     """Print and write the rows, then draw them, so that no figure can cost the data."""
     table = [dataclasses.asdict(row) for row in rows]
@@ -255,12 +259,11 @@ def _report(
     write_csv(args.out / f"{name}.csv", table)
     write_json(args.out / f"{name}.json", table)
     about = {
-        "policy": os.path.relpath(args.policy, REPOSITORY),
+        **origin,
         "seconds": args.seconds,
         "seed": args.seed,
         "sources": args.sources,
         "microphone": args.microphone,
-        "machine": machine_kind(),
     }
     write_json(args.out / f"{name}_about.json", about)
     figures = draw(rows, args.out) if draw else []

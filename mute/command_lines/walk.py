@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,7 +33,7 @@ from mute.evaluation.course import Course, load_course
 from mute.evaluation.recordings import Recordings
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.walk import Walk, follow_course, make_walk_env
-from mute.provenance import machine_kind
+from mute.provenance import sound_origin
 from mute.tasks import DEFAULT_TASK
 
 __all__ = ["WalkArgs", "walk"]
@@ -82,6 +83,7 @@ def walk(args: WalkArgs) -> None:
     gains = load_gains()
     make_directory(args.out)  # now: a walk is long, and must not be in vain
     torch.set_num_threads(1)
+    origin = sound_origin(args.policy)
     env = make_walk_env(policy.cfg.env, course, args.seed)
     with progress_bar("walk", course.length) as advance:
         result = follow_course(
@@ -98,7 +100,7 @@ def walk(args: WalkArgs) -> None:
             sources=args.sources,
         )
     print(_story(result, course))
-    files = _write(args, course, result, policy.iteration)
+    files = _write(args, course, result, {"iteration": policy.iteration} | origin)
     print(f"written to {args.out}: {', '.join(files)}")
 
 
@@ -107,18 +109,18 @@ def _recordings(args: WalkArgs) -> Recordings:
     return Recordings(wav, {0: args.video} if args.video else {}, tell)
 
 
-def _write(args: WalkArgs, course: Course, result: Walk, iteration: int) -> list[str]:
+def _write(
+    args: WalkArgs, course: Course, result: Walk, origin: Mapping[str, str | int]
+) -> list[str]:
     about = {
         "course": os.path.relpath(args.course, REPOSITORY),
-        "policy": os.path.relpath(args.policy, REPOSITORY),
-        "iteration": iteration,
+        **origin,
         "beta": args.beta,
         "course_speed": course.speed,
         "hold_speed": args.hold_speed,
         "seed": args.seed,
         "sources": args.sources,
         "microphone": args.microphone,
-        "machine": machine_kind(),
     }
     write_json(args.out / "walk.json", about | result.figures())
     files = ["walk.json"]

@@ -5,6 +5,7 @@ Every level here is modelled (`mute.acoustics`), not measured.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
@@ -13,9 +14,10 @@ import torch
 from scipy import stats
 
 from envs.quadruped_env import QuadrupedEnv
-from mute.acoustics.listener import HeardLevels, Listener
+from mute.acoustics.listener import Listener
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.soundscape import SOURCES
+from mute.acoustics.tally import HeardLevels
 from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
 from mute.evaluation.gait import Gait
@@ -59,8 +61,10 @@ class NoiseRow:
     """Commanded forward speed, m/s."""
     trials: int
     """Number of robots."""
+    trials_heard: int
+    """Those with a level: not the ones that kept falling. MNL, PNL and LAeq are over these."""
     mnl_mean: float
-    """Mean over trials of the mean noise level, dBA."""
+    """Mean over trials of the mean noise level, dBA; NaN if there is none."""
     mnl_std: float
     """Standard deviation of it, dBA; NaN for one trial."""
     mnl_ci95: float
@@ -74,7 +78,7 @@ class NoiseRow:
     laeq_mean: float
     """Mean over trials of the equivalent continuous level, dBA."""
     laeq_impacts: float
-    """The same of the impacts alone, from their energies; NaN if they are not heard."""
+    """Level of the impacts' mean energy over trials; -inf if they are silent, NaN if not heard."""
     laeq_scuffing: float
     """The same of scuffing."""
     laeq_drive: float
@@ -96,7 +100,7 @@ class NoiseRow:
     stride_frequency: float
     """Landings of a foot per second, Hz."""
     power: float
-    """Mechanical power of the joints, W."""
+    """Mean over all physics steps of the sum over joints of |torque times velocity|, W."""
     cost_of_transport: float
     """Power over weight times actual speed."""
     fall_rate: float
@@ -198,9 +202,11 @@ def _row(
     levels: Sequence[HeardLevels],
     weight: float,
 ) -> NoiseRow:
-    mnl, mnl_std, mnl_ci95 = _spread([trial.mnl for trial in levels])
-    pnl, pnl_std, pnl_ci95 = _spread([trial.pnl for trial in levels])
-    own = asdict(gait)
+    heard = [trial for trial in levels if math.isfinite(trial.mnl)]
+    mnl, mnl_std, mnl_ci95 = _spread([trial.mnl for trial in heard])
+    pnl, pnl_std, pnl_ci95 = _spread([trial.pnl for trial in heard])
+    power = _mean_power(levels)
+    own = asdict(gait) | {"power": power}
     shared = {name: own[name] for name in NoiseRow.__dataclass_fields__ if name in own}
     return NoiseRow(
         method=method,
@@ -208,28 +214,46 @@ def _row(
         surface=surface,
         command_speed=setting.command_speed,
         trials=len(levels),
+        trials_heard=len(heard),
         mnl_mean=mnl,
         mnl_std=mnl_std,
         mnl_ci95=mnl_ci95,
         pnl_mean=pnl,
         pnl_std=pnl_std,
         pnl_ci95=pnl_ci95,
-        laeq_mean=float(np.mean([trial.laeq for trial in levels])),
+        laeq_mean=_spread([trial.laeq for trial in heard])[0],
         **{
-            f"laeq_{name}": float(np.mean([trial.sources.get(name, np.nan) for trial in levels]))
+            f"laeq_{name}": _mean_energy([trial.sources.get(name, math.nan) for trial in levels])
             for name in SOURCES
         },
         speed_mean=gait.speed,
-        cost_of_transport=gait.power / (weight * gait.speed) if gait.speed > 0.0 else float("nan"),
+        cost_of_transport=power / (weight * gait.speed) if gait.speed > 0.0 else math.nan,
         **shared,
     )
+
+
+def _mean_power(levels: Sequence[HeardLevels]) -> float:
+    """Return the power over the time of all trials together, W; NaN where none counts."""
+    counted = [trial for trial in levels if trial.seconds > 0.0]
+    seconds = sum(trial.seconds for trial in counted)
+    work = sum(trial.power * trial.seconds for trial in counted)
+    return work / seconds if counted else math.nan
+
+
+def _mean_energy(values: Sequence[float]) -> float:
+    """Return the level of the mean energy, dB, without values that are NaN; NaN if all are."""
+    known = [10.0 ** (0.1 * value) for value in values if not math.isnan(value)]
+    if not known:
+        return math.nan
+    mean = sum(known) / len(known)
+    return 10.0 * math.log10(mean) if mean > 0.0 else -math.inf
 
 
 def _spread(values: Sequence[float]) -> tuple[float, float, float]:
     """Return mean, standard deviation and half width of the mean's 95 % confidence interval."""
     count = len(values)
     if count < 2:
-        return float(np.mean(values)), float("nan"), float("nan")
+        return values[0] if values else math.nan, math.nan, math.nan
     deviation = float(np.std(values, ddof=1))
     half_width = float(stats.t.ppf(0.975, count - 1)) * deviation / count**0.5
     return float(np.mean(values)), deviation, half_width

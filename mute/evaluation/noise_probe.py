@@ -8,6 +8,7 @@ their levels come from the energies of all sources, without audio. So these curv
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 from mute.acoustics.gains import load_gains
 from mute.controllers.learned import Policy
@@ -27,9 +28,10 @@ _SEED = 1
 class NoiseProbe:
     """Measures the modelled level of a policy at beta 0 and 1, quickly."""
 
-    def __init__(self) -> None:
-        """Load the calibration, once."""
-        self._gains = load_gains()
+    @cached_property
+    def _gains(self) -> dict[str, float]:
+        """The calibration: read once, and only where levels are measured."""
+        return load_gains()
 
     def measure(self, policy: Policy) -> dict[str, float]:
         """Return the mean noise levels at the microphone on the trunk by curve, dBA.

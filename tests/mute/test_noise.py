@@ -11,18 +11,22 @@ import pytest
 import torch
 from scipy import stats
 
-from mute.acoustics import listener
+from mute import card
+from mute.acoustics import calibration, listener
 from mute.acoustics.calibration import fit_gain
 from mute.acoustics.fan import FAN_LEVEL
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.soundscape import SOURCES
+from mute.acoustics.tally import HeardLevels
 from mute.command_lines.arguments import REPOSITORY
 from mute.controllers import load_policy
 from mute.errors import MuteError
+from mute.evaluation import noise, noise_probe
 from mute.evaluation.noise import NoiseRow, NoiseSetting, measure_noise
 from mute.evaluation.noise_probe import NoiseProbe
+from mute.evaluation.paper_levels import PAPER_LEVELS
 from mute.evaluation.recordings import Recordings
 
 
@@ -39,6 +43,11 @@ def rows() -> list[NoiseRow]:
 
 def test_the_same_seed_gives_the_same_table(rows):
     assert _measure(seed=1) == rows
+
+
+def test_the_gain_that_ships_gives_the_level_that_it_was_fitted_to(rows):
+    mnl, _ = PAPER_LEVELS["mute beta 0"]["wood"]
+    assert rows[0].mnl_mean == pytest.approx(mnl, abs=0.5)
 
 
 def test_a_policy_compared_with_itself_differs_by_less_than_its_confidence_interval(rows):
@@ -81,6 +90,58 @@ def test_a_source_that_is_not_heard_has_no_level():
     assert row.laeq_drive == pytest.approx(row.laeq_mean, abs=1e-6)
 
 
+def _heard(mnl: float, impacts: float = 60.0, seconds: float = 2.0) -> HeardLevels:
+    return HeardLevels(mnl, mnl + 4.0, mnl + 1.0, {"impacts": impacts}, seconds, power=25.0)
+
+
+def _row_of(monkeypatch, levels: list[HeardLevels]) -> NoiseRow:
+    monkeypatch.setattr(noise.Listener, "levels", lambda _: levels)
+    return _measure(seed=1, trials=len(levels) // 2, seconds=0.02, from_energies=True)[0]
+
+
+def test_a_trial_without_a_level_leaves_the_others_theirs(monkeypatch):
+    mute = HeardLevels(math.nan, math.nan, math.nan, {"impacts": math.nan}, 0.0, math.nan)
+    row = _row_of(monkeypatch, [_heard(68.0), _heard(68.2), mute, _heard(68.1)] * 2)
+    assert (row.trials, row.trials_heard) == (4, 3)
+    assert row.mnl_mean == pytest.approx(68.1)
+    assert row.pnl_mean == pytest.approx(72.1)
+    assert row.laeq_mean == pytest.approx(69.1)
+    assert row.mnl_std == pytest.approx(0.1)
+    assert row.mnl_ci95 == pytest.approx(4.303 * 0.1 / 3**0.5, rel=1e-3)  # t of 2 degrees
+    assert row.power == 25.0
+
+
+def test_a_source_that_is_silent_in_one_trial_keeps_the_level_of_the_others_energy(monkeypatch):
+    row = _row_of(monkeypatch, [_heard(60.0, 60.0), _heard(60.0, -math.inf)] * 2)
+    assert row.laeq_impacts == pytest.approx(60.0 - 3.01, abs=0.01)
+    assert math.isnan(row.laeq_fan)  # not among what is heard
+
+
+def test_a_setting_of_which_nothing_is_heard_has_no_level(monkeypatch):
+    mute = HeardLevels(math.nan, math.nan, math.nan, {"impacts": math.nan}, 0.0, math.nan)
+    row = _row_of(monkeypatch, [mute, mute])
+    assert row.trials_heard == 0
+    assert all(math.isnan(value) for value in (row.mnl_mean, row.pnl_mean, row.laeq_impacts))
+    assert math.isnan(row.power)
+
+
+def test_power_is_the_work_of_all_trials_over_their_time(monkeypatch):
+    half = dataclasses.replace(_heard(60.0), seconds=1.0, power=10.0)
+    assert _row_of(monkeypatch, [half, _heard(60.0)] * 2).power == pytest.approx(20.0)
+
+
+def test_the_card_tells_levels_without_spread_and_how_many_trials_have_one(tmp_path, capsys):
+    rows = json.loads((REPOSITORY / "docs" / "noise" / "noise.json").read_text())
+    rows[0] |= {"trials_heard": 1, "mnl_mean": 68.0, "mnl_std": None}
+    rows[1] |= {"trials_heard": 0, "mnl_mean": None, "mnl_std": None}
+    path = tmp_path / "noise.json"
+    path.write_text(json.dumps(rows))
+    card.main(["--noise", str(path)])
+    shown = capsys.readouterr().out
+    assert "| wood | 0 | 68.0 (1 of 5 trials) |" in shown
+    assert "| wood | 1 | - |" in shown
+
+
 def test_a_probe_of_a_training_is_near_the_table_and_draws_no_random_number(rows):
     policy = load_policy(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
     before = torch.get_rng_state()
@@ -88,6 +149,26 @@ def test_a_probe_of_a_training_is_near_the_table_and_draws_no_random_number(rows
     assert torch.equal(torch.get_rng_state(), before)
     expected = {f"Noise/level_beta_{row.beta:g}": row.mnl_mean for row in rows}
     assert levels == pytest.approx(expected, abs=1.0)
+
+
+def test_a_training_that_measures_no_noise_needs_no_calibration(monkeypatch):
+    def fail() -> None:
+        raise MuteError("no calibration")
+
+    policy = load_policy(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
+    monkeypatch.setattr(noise_probe, "load_gains", fail)
+    probe = NoiseProbe()
+    with pytest.raises(MuteError, match="no calibration"):
+        probe.measure(policy)
+
+
+def test_a_probe_leaves_out_the_robots_that_keep_falling(monkeypatch):
+    mute = HeardLevels(math.nan, math.nan, math.nan, {}, 0.0, math.nan)
+    levels = [_heard(68.0), mute, _heard(69.0), mute, mute, mute, mute, mute]
+    monkeypatch.setattr(noise.Listener, "levels", lambda _: levels)
+    monkeypatch.setattr(noise_probe, "_SECONDS", 0.02)
+    policy = load_policy(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
+    assert NoiseProbe().measure(policy) == {"Noise/level_beta_0": pytest.approx(68.5)}
 
 
 def test_a_policy_that_acts_between_the_physics_steps_has_no_level():
@@ -140,6 +221,20 @@ def test_the_shipped_calibration_has_every_floor_and_where_it_comes_from():
         if "target_mnl" in floor:
             assert floor["mnl"] == pytest.approx(floor["target_mnl"], abs=0.02)
     assert content["command"].startswith("python -m mute.acoustics.calibration ")
+
+
+def test_a_calibration_reaches_the_papers_levels_and_is_near_the_one_that_ships(tmp_path):
+    out = tmp_path / "gains.json"
+    assert calibration.main(["--trials", "1", "--seconds", "2", "--out", str(out)]) == 0
+    content, shipped = json.loads(out.read_text()), load_gains()
+    for name, (mnl, _) in PAPER_LEVELS["mute beta 0"].items():
+        row = content["floors"][name]
+        assert row["target_mnl"] == mnl == pytest.approx(row["mnl"], abs=0.02)
+        assert row["mnl"] < row["pnl"] < row["mnl"] + 8.0
+    for name, gain in load_gains(out).items():  # one robot for 2 s is not five for 10 s
+        assert 20.0 * math.log10(gain / shipped[name]) == pytest.approx(0.0, abs=1.0)
+    assert "--trials 1 --seconds 2 " in content["command"]
+    assert content["policy"]["iteration"] == 400
 
 
 @pytest.mark.parametrize(

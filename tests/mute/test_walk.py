@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import wave
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,6 +23,8 @@ from mute.errors import MuteError
 from mute.evaluation.course import Course, FloorArea
 from mute.evaluation.recordings import Recordings
 from mute.evaluation.walk import Walk, follow_course, make_walk_env, time_limit
+from mute.provenance import sound_origin
+from mute.session import Session
 
 POLICY = REPOSITORY / "resources" / "go1" / "go1_mute.pt"
 COURSE = Course(
@@ -83,10 +86,29 @@ def test_keeping_the_sound_changes_no_figure(walk, tmp_path):
     path = tmp_path / "walk.wav"
     assert _walk(COURSE, keep=Recordings({0: path})).figures() == walk.figures()
     samples, rate = read_wav(path)
-    # The file begins once the robot has settled, and holds what the cheap path measures.
+    # The file begins once the robot has settled, and holds what is measured.
     assert samples.shape[1] / rate == pytest.approx(walk.seconds - 1.0)
     (heard,) = measure(samples * WAV_FULL_SCALE, rate)
-    assert walk.mnl == pytest.approx(heard.mnl, abs=0.7)
+    assert walk.mnl == pytest.approx(heard.mnl, abs=0.1)
+    assert walk.pnl == pytest.approx(heard.pnl, abs=0.1)
+    assert walk.laeq == pytest.approx(heard.laeq, abs=0.1)
+
+
+def test_levels_from_energies_are_near_those_of_the_sound(walk):
+    counted = _walk(COURSE, from_energies=True)
+    assert counted.mnl == pytest.approx(walk.mnl, abs=0.3)
+    assert counted.laeq == pytest.approx(walk.laeq, abs=0.3)
+    assert counted.pnl == pytest.approx(walk.pnl, abs=1.1)
+    assert counted.pnl != walk.pnl
+    assert counted.gait == walk.gait
+
+
+def test_the_power_is_not_sampled_at_the_control_rate(monkeypatch):
+    sampled = Session.gait
+    monkeypatch.setattr(Session, "gait", lambda own: replace(sampled(own), power=math.nan))
+    env = make_walk_env(load_policy(POLICY).cfg.env, STRAIGHT, seed=1)
+    result = follow_course(env, _Falling(env, step=75), STRAIGHT, beta=0.0, from_energies=True)
+    assert 10.0 < result.gait.power < 50.0
 
 
 def test_every_reading_has_its_time_place_and_floor(walk):
@@ -168,6 +190,8 @@ def test_the_command_writes_figures_track_map_and_sound(tmp_path, capsys):
     content = json.loads((out / "walk.json").read_text())
     assert content["end"] == "arrived"
     assert content["beta"] == 0.0
+    assert content["iteration"] == 400
+    assert content.items() >= sound_origin(POLICY).items()
     assert content["mnl"] < content["pnl"]
     with (out / "track.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from itertools import count
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
 from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
-from mute.acoustics import listener as listener_module
 from mute.acoustics.gains import load_gains
-from mute.acoustics.listener import SAMPLE_RATE, HeardLevels, Listener, WavFile
+from mute.acoustics.levels import LevelDetector
+from mute.acoustics.listener import SAMPLE_RATE, Listener
+from mute.acoustics.tally import HeardLevels
 from mute.acoustics.wav import read_wav
 from mute.command_lines.arguments import REPOSITORY
 from mute.controllers import LearnedController, load_policy
@@ -95,13 +95,50 @@ def test_a_reading_counts_once_robot_and_detector_have_settled_after_start_and_f
     assert after == pytest.approx(np.arange(51, 61) / 20)
 
 
+def test_a_stretch_costs_the_same_however_long_the_walk_has_been(monkeypatch):
+    asked, from_number = [], LevelDetector.reading_times_from
+    monkeypatch.setattr(
+        LevelDetector,
+        "reading_times_from",
+        lambda detector, number: asked.append(len(new := from_number(detector, number))) or new,
+    )
+    env = _make_env()
+    listener = Listener(env, ["tile"], settle_time=SETTLE, from_energies=True, stretch=0.1)
+    with listener:
+        _walk(env, listener, 100)
+    assert asked == [0, 0, 0, 0, 1] + 15 * [2]  # a reading every 0.05 s, from 0.5 s on
+    assert listener.readings().shape == (2, 31)
+
+
+def test_the_power_is_the_integral_over_the_physics_steps_that_count():
+    env = _make_env()
+    listener = Listener(env, ["tile"], settle_time=SETTLE, from_energies=True)
+    record, powers = env.on_physics_step, []
+    assert record is not None
+
+    def record_both() -> None:
+        record()
+        torque, velocity = env.simulation.actuator_force, env.simulation.qvel[:, 6:]
+        powers.append((torque * velocity).abs().sum(dim=1).tolist())
+
+    env.on_physics_step = record_both
+    with listener:
+        _walk(env, listener, 100, upset=50)
+    first, second = np.array(powers).T
+    settle = round(SETTLE * 1000)
+    whole = [first[settle:], np.append(second[settle:1000], second[1020 + settle :])]
+    power = [levels.power for levels in listener.levels()]
+    assert power == pytest.approx([own.mean() for own in whole], rel=1e-4)
+
+
 def test_the_equivalent_level_leaves_out_what_does_not_count():
     env = _make_env()
     listener = Listener(env, ["tile"], settle_time=SETTLE, sources=("fan",), from_energies=True)
     with listener:
         _walk(env, listener, 120, upset=60)
     assert [levels.laeq for levels in listener.levels()] == pytest.approx([55.0, 55.0], abs=0.2)
-    assert listener._tally[0] == pytest.approx([2.4 - SETTLE, 2.4 - 2 * SETTLE - 0.02])
+    counted = [levels.seconds for levels in listener.levels()]
+    assert counted == pytest.approx([2.4 - SETTLE, 2.4 - 2 * SETTLE - 0.02])
 
 
 def test_a_simulation_that_blows_up_is_not_heard(tmp_path):
@@ -144,29 +181,3 @@ def test_one_file_that_cannot_be_opened_leaves_the_others_closed(tmp_path):
     with pytest.raises(MuteError, match="Is a directory"), listener:
         pass
     assert listener.clipped == {0: 0}
-
-
-def test_samples_beyond_full_scale_are_cut_off_and_counted(tmp_path):
-    file = WavFile(tmp_path / "loud.wav")
-    file.write(np.array([0.0, 2.0, 5.0, -5.0]))
-    file.close()
-    assert file.clipped == 2
-    samples = read_wav(file.path)[0][0]
-    assert samples == pytest.approx([0.0, 0.5, 1.0, -1.0], abs=1e-4)
-
-
-def test_a_file_ends_at_its_greatest_length(tmp_path, monkeypatch):
-    monkeypatch.setattr(listener_module, "_LONGEST_FILE", 5)
-    file = WavFile(tmp_path / "long.wav")
-    for _ in range(3):
-        file.write(np.zeros(3))
-    file.close()
-    assert read_wav(file.path)[0].shape == (1, 5)
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
-def test_a_full_disk_is_told_in_one_line():
-    file = WavFile(Path("/dev/full"))
-    with pytest.raises(MuteError, match="cannot write /dev/full: No space left on device"):
-        file.write(np.zeros(100_000))
-        file.close()
