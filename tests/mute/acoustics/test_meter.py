@@ -296,10 +296,21 @@ def test_arguments_that_do_not_fit_are_refused_by_name(recording, arguments, nam
         meter.main([str(recording), *arguments])
 
 
-def test_a_sample_rate_below_the_lowest_is_refused(tmp_path):
-    write_wav(tmp_path / "low.wav", tone(0.1, rate=4000), 4000)
-    with pytest.raises(MuteError, match=r"low\.wav: sample rate 4000 Hz"):
-        meter.main([str(tmp_path / "low.wav")])
+@pytest.mark.parametrize("rate", [4000, 768001, 2**32 - 1])
+def test_a_sample_rate_that_no_level_is_taken_from_is_refused(tmp_path, rate):
+    path = tmp_path / "odd.wav"
+    write_wav(path, tone(0.1), RATE)
+    content = path.read_bytes()
+    path.write_bytes(content[:24] + rate.to_bytes(4, "little") + content[28:])  # in the header
+    expected = rf"odd\.wav: sample rate {rate} Hz, levels need 8000 to 768000 Hz"
+    with pytest.raises(MuteError, match=expected):
+        meter.main([str(path)])
+
+
+def test_the_highest_sample_rate_is_measured(capsys, tmp_path):
+    write_wav(tmp_path / "high.wav", tone(0.1, rate=768000), 768000)
+    figures, _ = run(capsys, tmp_path / "high.wav")
+    assert figures["laeq"] == pytest.approx(-20.0, abs=0.01)
 
 
 def test_the_lines_say_what_is_calibrated_and_what_is_not(capsys, recording, calibration):
