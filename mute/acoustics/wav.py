@@ -30,6 +30,7 @@ __all__ = [
     "WavEncoding",
     "WavFormat",
     "WavReader",
+    "has_samples",
     "read_wav",
     "wav_header",
     "write_wav",
@@ -164,6 +165,12 @@ def read_wav(path: Path) -> tuple[NDArray[np.float64], int]:
     """
     with WavReader(path) as wav:
         return np.concatenate(list(wav.blocks()), axis=1), wav.sample_rate
+
+
+def has_samples(path: Path) -> bool:
+    """Tell whether a WAV file that was written here holds any sample."""
+    header = wav_header(WavFormat(PCM, channels=1, sample_rate=1, bits=8, valid_bits=8), 0)
+    return path.stat().st_size > len(header)
 
 
 def write_wav(

@@ -130,9 +130,13 @@ def test_a_fall_ends_the_walk_where_the_robot_fell():
     assert result.track.time[-1] <= result.seconds
 
 
-def test_a_fall_before_the_first_reading_has_no_level():
+def test_a_fall_before_the_first_reading_has_no_level_and_no_sound(tmp_path):
     env = make_walk_env(load_policy(POLICY).cfg.env, STRAIGHT, seed=1)
-    result = follow_course(env, _Falling(env, step=5), STRAIGHT, beta=0.0)
+    notes = []
+    keep = Recordings({0: tmp_path / "fall.wav"}, on_note=notes.append)
+    result = follow_course(env, _Falling(env, step=5), STRAIGHT, beta=0.0, keep=keep)
+    assert list(tmp_path.iterdir()) == []
+    assert "fall.wav is not written: the walk ended before" in notes[0]
     assert result.end == "fell"
     assert math.isnan(result.mnl)
     assert (len(result.track.time), result.floors) == (0, ())

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from mute.acoustics.wav import WavReader, read_wav, write_wav
+from mute.acoustics.wav import WavReader, has_samples, read_wav, write_wav
 from mute.errors import MuteError
 
 SAMPLES = np.array([[0.0, 0.5, -0.5, 0.25], [-1.0, 0.125, 0.75, 0.0]])
@@ -41,6 +41,13 @@ def test_what_is_written_is_read_back(tmp_path, encoding, step, channels):
     back, sample_rate = read_wav(path)
     assert sample_rate == 44100
     np.testing.assert_allclose(back, samples, atol=step)
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_file_without_samples_is_known(tmp_path, count):
+    path = tmp_path / "file.wav"
+    write_wav(path, np.zeros(count), 48000, "int16")
+    assert has_samples(path) is bool(count)
 
 
 @pytest.mark.parametrize("encoding", ["float32", "int16", "int24"])
