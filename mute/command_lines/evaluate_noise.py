@@ -32,6 +32,7 @@ from mute.command_lines.sound_options import (
     load_audible_policy,
     progress_bar,
     tell,
+    tell_kept,
 )
 from mute.errors import MuteError
 from mute.evaluation.noise import SETTLE_TIME, NoiseRow, NoiseSetting, measure_noise
@@ -181,6 +182,7 @@ def _run(
     ]
     rows = _measure(name, args, surfaces, settings, kept)
     _report(name, args, rows, draw)
+    tell_kept(kept)
 
 
 def _measure(
@@ -264,7 +266,8 @@ def _report(
     }
     write_json(args.out / f"{name}_about.json", about)
     figures = draw(rows, args.out) if draw else []
-    names = [f"{name}.json", f"{name}.csv", *(path.name for path in figures)]
+    data = [f"{name}.json", f"{name}.csv", f"{name}_about.json"]
+    names = [*data, *(path.name for path in figures)]
     print(f"written to {args.out}: {', '.join(names)}")
 
 

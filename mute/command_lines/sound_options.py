@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -17,6 +17,7 @@ from mute.controllers import load_policy
 from mute.controllers.learned import Policy
 from mute.errors import MuteError
 from mute.evaluation.listening import listening_cfg
+from mute.evaluation.recordings import Recordings
 
 __all__ = [
     "check_sources",
@@ -24,6 +25,7 @@ __all__ = [
     "load_audible_policy",
     "progress_bar",
     "tell",
+    "tell_kept",
 ]
 
 _FARTHEST = 100.0
@@ -99,3 +101,10 @@ def progress_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
 def tell(note: str) -> None:
     """Print a line on standard error."""
     print(note, file=sys.stderr)
+
+
+def tell_kept(recordings: Iterable[Recordings]) -> None:
+    """Print which sounds and films have been kept, if any."""
+    paths = [str(path) for walks in recordings for path in walks.kept]
+    if paths:
+        print(f"kept: {', '.join(paths)}")

@@ -26,6 +26,7 @@ from mute.command_lines.sound_options import (
     load_audible_policy,
     progress_bar,
     tell,
+    tell_kept,
 )
 from mute.controllers import LearnedController
 from mute.evaluation.course import Course, load_course
@@ -83,6 +84,7 @@ def walk(args: WalkArgs) -> None:
     make_directory(args.out)  # now: a walk is long, and must not be in vain
     torch.set_num_threads(1)
     env = make_walk_env(policy.cfg.env, course, args.seed)
+    keep = _recordings(args)
     with progress_bar("walk", course.length) as advance:
         result = follow_course(
             env,
@@ -92,7 +94,7 @@ def walk(args: WalkArgs) -> None:
             gains,
             args.seed,
             args.hold_speed,
-            _recordings(args),
+            keep,
             advance,
             microphone=microphone,
             sources=args.sources,
@@ -100,6 +102,7 @@ def walk(args: WalkArgs) -> None:
     print(_story(result, course))
     files = _write(args, course, result, policy.iteration)
     print(f"written to {args.out}: {', '.join(files)}")
+    tell_kept([keep])
 
 
 def _recordings(args: WalkArgs) -> Recordings:

@@ -29,12 +29,14 @@ class Recordings:
     on_note: Callable[[str], None] = lambda note: None
     """Told in one line of each file that is not as one would wish: clipped, silent, or
     missing because the walk was too short."""
+    kept: list[Path] = field(default_factory=list)
+    """The files that are whole, once their walks are over."""
 
     def spaced(self, stride: int) -> Recordings:
         """Return the same with every index multiplied: of the first robots of groups."""
         wav = {index * stride: path for index, path in self.wav.items()}
         video = {index * stride: path for index, path in self.video.items()}
-        return Recordings(wav, video, self.on_note)
+        return Recordings(wav, video, self.on_note, self.kept)
 
     def note_clipped(self, samples: Mapping[int, int]) -> None:
         """Tell of each walk whose sound has samples beyond full scale, given their numbers."""
@@ -99,13 +101,17 @@ def filming(env: QuadrupedEnv, recordings: Recordings, start: float) -> Iterator
 
 
 def _finish(recordings: Recordings, videos: Mapping[int, Video]) -> None:
-    """Drop sounds that never began, and tell of what is not as one would wish."""
-    for path in recordings.wav.values():
-        if path.exists() and not has_samples(path):
+    """Drop sounds that never began, list what is kept, and tell of what is not as wished."""
+    for path in filter(Path.exists, recordings.wav.values()):
+        if has_samples(path):
+            recordings.kept.append(path)
+        else:
             path.unlink()
             recordings.on_note(f"{path} is not written: the walk ended before its sound began")
     for video in videos.values():
         if video.never_began:
             recordings.on_note(f"{video.path} is not written: the walk ended before it began")
+        else:
+            recordings.kept.append(video.path)
         if video.silent_because:
             recordings.on_note(f"{video.path} is without sound: {video.silent_because}")

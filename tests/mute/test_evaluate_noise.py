@@ -68,16 +68,22 @@ def test_noise_prints_a_table_and_writes_csv_json_and_sound(tmp_path, capsys):
     wav = tmp_path / "walk.wav"
     arguments = ["noise", "--surface", "tile,carpet", "--trials", "1", "--seconds", "1.5"]
     assert evaluate.main([*arguments, "--out", str(tmp_path), "--wav", str(wav)]) == 0
-    assert "modelled" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "modelled" in shown
     rows = _read_back(tmp_path, "noise")
     assert [(row["surface"], row["beta"]) for row in rows] == [
         ("tile", 0.0), ("tile", 1.0), ("carpet", 0.0), ("carpet", 1.0)
     ]  # fmt: skip
     assert rows[0]["mnl_std"] is None  # one trial has no spread
-    for name in ("tile-beta0", "tile-beta1", "carpet-beta0", "carpet-beta1"):
-        with wave.open(str(tmp_path / f"walk-{name}.wav")) as file:
+    names = ("tile-beta0", "tile-beta1", "carpet-beta0", "carpet-beta1")
+    kept = [tmp_path / f"walk-{name}.wav" for name in names]
+    for path in kept:
+        with wave.open(str(path)) as file:
             assert file.getnframes() == 1.5 * file.getframerate()
     assert not wav.exists()
+    written, last = shown.splitlines()[-2:]
+    assert written == f"written to {tmp_path}: noise.json, noise.csv, noise_about.json"
+    assert last == f"kept: {', '.join(map(str, kept))}"
 
 
 def test_the_sweeps_write_figures_with_the_data_beside(tmp_path):

@@ -28,8 +28,10 @@ def _no_pictures(monkeypatch):
 def test_what_never_began_leaves_no_file_and_is_told(env, tmp_path, stopped):
     wav, film, notes = tmp_path / "walk.wav", tmp_path / "walk.mp4", []
 
+    wanted = Recordings({0: wav}, {0: film}, notes.append)
+
     def walk():
-        with filming(env, Recordings({0: wav}, {0: film}, notes.append), start=1.0) as films:
+        with filming(env, wanted, start=1.0) as films:
             WavFile(films.sounds[0]).close()
             films.record()  # of a tenth of the time after which the film begins
             if stopped:
@@ -44,7 +46,7 @@ def test_what_never_began_leaves_no_file_and_is_told(env, tmp_path, stopped):
         f"{wav} is not written: the walk ended before its sound began",
         f"{film} is not written: the walk ended before it began",
     ]
-    assert list(tmp_path.iterdir()) == []
+    assert (list(tmp_path.iterdir()), wanted.kept) == ([], [])
 
 
 def test_a_second_film_that_cannot_be_made_leaves_nothing_of_the_first(env, tmp_path):

@@ -183,6 +183,7 @@ def test_the_command_writes_figures_track_map_and_sound(tmp_path, capsys):
         assert file.getnframes() / file.getframerate() == pytest.approx(content["seconds"] - 1.0)
     shown = capsys.readouterr().out
     assert "arrived after 1.6 m" in shown
+    assert shown.endswith(f"kept: {wav}\n")
     assert "modelled" in shown
 
 
