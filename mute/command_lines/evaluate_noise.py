@@ -46,6 +46,9 @@ __all__ = ["NoiseArgs", "SweepBetaArgs", "SweepSpeedArgs", "noise", "sweep_beta"
 _SPEEDS = tuple(round(0.1 * tenth, 1) for tenth in range(4, 11))
 _BETAS = tuple(round(0.1 * tenth, 1) for tenth in range(11))
 _MAX_ROBOTS = 1024
+_MAX_FILMS = 32
+"""Most films that are made side by side: each has a renderer and an encoder of its own, which take
+some 0.25 GB where the processor renders."""
 
 _Draw = Callable[[Sequence[NoiseRow], Path], list[Path]]
 
@@ -175,6 +178,7 @@ def _run(
     _check(args, surfaces, args.beta, speeds)
     check_wav(args.wav)
     check_video(args.video)
+    _check_films(args.video, len(args.beta) * len(speeds))
     settings = [NoiseSetting(beta, speed) for beta in args.beta for speed in speeds]
     kept = [
         Recordings(wav, video, tell)
@@ -315,4 +319,17 @@ def _check(
         raise MuteError(
             f"--trials {args.trials} with {settings} settings is {settings * args.trials} robots; "
             f"at most {_MAX_ROBOTS} fit side by side"
+        )
+
+
+def _check_films(video: Path | None, settings: int) -> None:
+    """Check how many films are asked for.
+
+    Raises:
+        MuteError: If there are too many.
+    """
+    if video is not None and settings > _MAX_FILMS:
+        raise MuteError(
+            f"--video with {settings} settings is {settings} films; at most {_MAX_FILMS} are made "
+            "side by side"
         )

@@ -29,6 +29,7 @@ PROMISED = {
     "pnl_std", "laeq_mean", "speed_mean", "velocity_error_sq", "landing_speed_rms", "apex_mean",
     "duty_factor", "stride_frequency", "power", "cost_of_transport",
 }  # fmt: skip
+TENTHS = ",".join(f"{0.1 * tenth:.1f}" for tenth in range(1, 12))
 
 
 def _row(beta: float, surface: str = "wood", speed: float = 0.5) -> NoiseRow:
@@ -207,6 +208,10 @@ def test_a_walk_takes_sources_and_microphone_and_commands_the_course_speed(monke
         (["noise", "--wav", "walk.mp3"], ["--wav", "'walk.mp3'"]),
         (["sweep-beta", "--video", "walk.avi"], ["--video", "'walk.avi'"]),
         (["walk", "--video", "walk"], ["--video", "'walk'"]),
+        (
+            ["sweep-speed", "--beta", "0,0.5,1", "--speed", TENTHS, "--video", "walk.mp4"],
+            ["--video", "33 films", "at most 32"],
+        ),
         (["walk", "--wav", "walk"], ["--wav", "'walk'"]),
         (["sweep-speed", "--speed", "0"], ["--speed", "0"]),
         (["sweep-speed", "--speed", ""], ["--speed", "none"]),
