@@ -8,8 +8,10 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import torch
+import tyro
 
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
@@ -27,6 +29,8 @@ from mute.command_lines.arguments import (
     make_directory,
 )
 from mute.command_lines.sound_options import (
+    MicrophonePlace,
+    Sources,
     check_sources,
     find_microphone,
     load_audible_policy,
@@ -50,6 +54,13 @@ _MAX_FILMS = 32
 """Most films that are made side by side: each has a renderer and an encoder of its own, which take
 some 0.25 GB where the processor renders."""
 
+_FilmFile = Annotated[
+    Path | None,
+    tyro.conf.arg(
+        help="Film first trials, with that sound, to FILE.mp4, or to files named likewise."
+    ),
+]
+
 _Draw = Callable[[Sequence[NoiseRow], Path], list[Path]]
 
 
@@ -63,11 +74,8 @@ class _CommonArgs:
     """Measured length of a trial, s."""
     seed: int = 1
     """Seed of initial states and of the noise."""
-    sources: Words = SOURCES
-    """What to hear: impacts, scuffing, drive, fan."""
-    microphone: str = "trunk"
-    """Where to listen: trunk, or X,Y,Z of a listener who walks along, m forward, left, and up from
-    the ground under the robot: 0,1,1.2."""
+    sources: Sources = SOURCES
+    microphone: MicrophonePlace = "trunk"
     out: Path = Path("evaluation")
     """Directory of the files that are written."""
 
@@ -85,8 +93,7 @@ class NoiseArgs(_CommonArgs):
     wav: Path | None = None
     """Keep the sound of first trials: in FILE.wav where there is one floor and one beta, else in
     FILE-<surface>-beta<beta>.wav."""
-    video: Path | None = None
-    """Film first trials, with that sound, to FILE.mp4, or to files named likewise."""
+    video: _FilmFile = None
 
 
 @dataclass
@@ -102,8 +109,7 @@ class SweepSpeedArgs(_CommonArgs):
     wav: Path | None = None
     """Keep the sound of first trials: in FILE.wav where there is one speed and one beta, else in
     FILE-speed<speed>-beta<beta>.wav."""
-    video: Path | None = None
-    """Film first trials, with that sound, to FILE.mp4, or to files named likewise."""
+    video: _FilmFile = None
 
 
 @dataclass
@@ -119,8 +125,7 @@ class SweepBetaArgs(_CommonArgs):
     wav: Path | None = None
     """Keep the sound of first trials: in FILE.wav where there is one beta, else in
     FILE-speed<speed>-beta<beta>.wav."""
-    video: Path | None = None
-    """Film first trials, with that sound, to FILE.mp4, or to files named likewise."""
+    video: _FilmFile = None
 
 
 def noise(args: NoiseArgs) -> None:

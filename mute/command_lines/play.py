@@ -21,7 +21,6 @@ from mute.acoustics.soundscape import SOURCES
 from mute.checkpoint import latest_checkpoint
 from mute.command_lines.arguments import (
     REPOSITORY,
-    Words,
     check_seed,
     check_video,
     check_wav,
@@ -29,7 +28,13 @@ from mute.command_lines.arguments import (
     parse,
 )
 from mute.command_lines.play_figures import live_captions, report, summary
-from mute.command_lines.sound_options import check_sources, find_microphone, progress_bar
+from mute.command_lines.sound_options import (
+    MicrophonePlace,
+    Sources,
+    check_sources,
+    find_microphone,
+    progress_bar,
+)
 from mute.controllers import LearnedController, load_policy
 from mute.controllers.learned import Policy
 from mute.errors import EXIT_INTERRUPTED, MuteError
@@ -87,11 +92,8 @@ class PlayArgs:
     """Floor to walk on and to hear, with physics at 1 ms: wood, carpet, tile or concrete. Unless
     given, training's floor and physics, with a level (modelled, sounding as wood); with --wav or
     --video, wood."""
-    sources: Words = SOURCES
-    """What to hear: impacts, scuffing, drive, fan."""
-    microphone: str = "trunk"
-    """Where to listen: trunk, or X,Y,Z of a listener who walks along, m forward, left, and up from
-    the ground under the robot: 0,1,1.2."""
+    sources: Sources = SOURCES
+    microphone: MicrophonePlace = "trunk"
     wav: Path | None = None
     """Keep the modelled sound of the first robot in this .wav file."""
     video: Path | None = None

@@ -6,13 +6,15 @@ import contextlib
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Annotated
 
+import tyro
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.soundscape import SOURCES
-from mute.command_lines.arguments import check_distinct
+from mute.command_lines.arguments import Words, check_distinct
 from mute.controllers import load_policy
 from mute.controllers.learned import Policy
 from mute.errors import MuteError
@@ -20,6 +22,8 @@ from mute.evaluation.listening import listening_cfg
 from mute.evaluation.recordings import Recordings
 
 __all__ = [
+    "MicrophonePlace",
+    "Sources",
     "check_sources",
     "find_microphone",
     "load_audible_policy",
@@ -27,6 +31,18 @@ __all__ = [
     "tell",
     "tell_kept",
 ]
+
+Sources = Annotated[Words, tyro.conf.arg(help="What to hear: impacts, scuffing, drive, fan.")]
+"""Type of the option --sources."""
+
+MicrophonePlace = Annotated[
+    str,
+    tyro.conf.arg(
+        help="Where to listen: trunk, or X,Y,Z of a listener who walks along, m forward, left, and "
+        "up from the ground under the robot: 0,1,1.2."
+    ),
+]
+"""Type of the option --microphone."""
 
 _FARTHEST = 100.0
 """Largest coordinate of a microphone, m."""

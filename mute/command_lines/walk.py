@@ -13,7 +13,6 @@ from mute.acoustics.gains import load_gains
 from mute.acoustics.soundscape import SOURCES
 from mute.command_lines.arguments import (
     REPOSITORY,
-    Words,
     check_betas,
     check_seed,
     check_video,
@@ -21,6 +20,8 @@ from mute.command_lines.arguments import (
     make_directory,
 )
 from mute.command_lines.sound_options import (
+    MicrophonePlace,
+    Sources,
     check_sources,
     find_microphone,
     load_audible_policy,
@@ -54,11 +55,8 @@ class WalkArgs:
     that different betas walk equally fast; unless given, the command is the course's speed."""
     seed: int = 1
     """Seed of the initial state and of the noise."""
-    sources: Words = SOURCES
-    """What to hear: impacts, scuffing, drive, fan."""
-    microphone: str = "trunk"
-    """Where to listen: trunk, or X,Y,Z of a listener who walks along, m forward, left, and up from
-    the ground under the robot: 0,1,1.2."""
+    sources: Sources = SOURCES
+    microphone: MicrophonePlace = "trunk"
     out: Path = Path("evaluation")
     """Directory of the files that are written."""
     wav: Path | None = None
