@@ -39,13 +39,18 @@ MicrophonePlace = Annotated[
     str,
     tyro.conf.arg(
         help="Where to listen: trunk, or X,Y,Z of a listener who walks along, m forward, left, and "
-        "up from the ground under the robot: 0,1,1.2."
+        "up from the ground under the robot: 0,1,1.2; or world:X,Y,Z, a place that stays, from "
+        "where a walk begins: world:2,1,1.2. Trials of tables and sweeps walk off in all "
+        "directions."
     ),
 ]
 """Type of the option --microphone."""
 
 _FARTHEST = 100.0
 """Largest coordinate of a microphone, m."""
+
+_WORLD = "world:"
+"""What stands before the place of a microphone that does not move."""
 
 
 def check_sources(sources: Sequence[str]) -> None:
@@ -65,22 +70,25 @@ def find_microphone(text: str) -> Microphone:
 
     Args:
         text: `trunk`, or `X,Y,Z`: the place of a listener who walks along, m forward, to the left,
-            and up from the ground under the robot.
+            and up from the ground under the robot; or `world:X,Y,Z`: a place in the world, m.
 
     Raises:
-        MuteError: If it is neither, below the ground, or too far away.
+        MuteError: If it is none of these, below the ground, or too far away.
     """
     if text == "trunk":
         return Microphone()
+    place = text.removeprefix(_WORLD)
     try:
-        x, y, z = (float(part) for part in text.split(","))
+        x, y, z = (float(part) for part in place.split(","))
     except ValueError:
-        raise MuteError(f"--microphone must be trunk or X,Y,Z in m, got {text!r}") from None
+        raise MuteError(
+            f"--microphone must be trunk, X,Y,Z or {_WORLD}X,Y,Z in m, got {text!r}"
+        ) from None
     if not (all(abs(value) <= _FARTHEST for value in (x, y, z)) and z >= 0.0):
         raise MuteError(
             f"--microphone must be within {_FARTHEST:g} m and not below the ground, got {text!r}"
         )
-    return Microphone((x, y, z), "beside")
+    return Microphone((x, y, z), "beside" if place == text else "world")
 
 
 def load_audible_policy(path: Path) -> Policy:

@@ -134,6 +134,11 @@ def test_a_listener_and_the_sources_come_to_the_measurement(asked, tmp_path):
     assert asked[0]["sources"] == ("impacts", "drive")
 
 
+def test_a_microphone_can_stand_in_the_world(asked, tmp_path):
+    evaluate.main(["noise", "--microphone", "world:2,-1.5,1.2", "--out", str(tmp_path)])
+    assert asked[0]["microphone"] == Microphone((2.0, -1.5, 1.2), "world")
+
+
 def test_clipped_samples_are_a_line_on_standard_error(monkeypatch, tmp_path, capsys):
     def measure(*words, **__):
         words[7].note_clipped({0: 12})
@@ -201,6 +206,9 @@ def test_a_walk_takes_sources_and_microphone_and_commands_the_course_speed(monke
         (["noise", "--sources", ""], ["--sources", "none"]),
         (["noise", "--sources", "fan,fan"], ["--sources", "fan again"]),
         (["noise", "--microphone", "ceiling"], ["--microphone", "X,Y,Z", "'ceiling'"]),
+        (["noise", "--microphone", "world:"], ["world:X,Y,Z", "'world:'"]),
+        (["noise", "--microphone", "world:trunk"], ["world:X,Y,Z", "'world:trunk'"]),
+        (["noise", "--microphone", "world:0,0,-1"], ["below the ground", "'world:0,0,-1'"]),
         (["noise", "--microphone", "0,1"], ["--microphone", "X,Y,Z", "'0,1'"]),
         (["walk", "--microphone", "0,nan,1"], ["--microphone", "'0,nan,1'"]),
         (["noise", "--microphone", "0,1,-0.2"], ["--microphone", "below the ground"]),

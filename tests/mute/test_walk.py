@@ -13,6 +13,7 @@ import torch
 import yaml
 
 from mute.acoustics.listener import WAV_FULL_SCALE
+from mute.acoustics.microphone import Microphone
 from mute.acoustics.sound_level_meter import measure
 from mute.acoustics.wav import read_wav
 from mute.command_lines import evaluate
@@ -148,6 +149,11 @@ def test_a_robot_that_falls_behind_is_asked_for_more_only_where_the_speed_is_hel
     assert held.command_mean > 0.37
     assert left.command_mean < 0.3601
     assert left.seconds > held.seconds
+
+
+def test_a_robot_gets_louder_as_it_walks_up_to_a_microphone_that_stands_in_the_world():
+    levels = _walk(STRAIGHT, microphone=Microphone((1.0, 0.0, 0.3), "world")).track.level
+    assert levels[-10:].mean() > levels[:10].mean() + 3.0
 
 
 def test_a_walk_is_given_up_after_twice_the_time_that_it_should_take():
