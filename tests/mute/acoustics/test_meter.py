@@ -374,11 +374,15 @@ def test_a_tone_of_1_khz_and_40_db_has_one_sone():
     assert loudness.n5 == pytest.approx(1.0, abs=0.02)
 
 
-def test_the_meter_for_arrays_needs_numpy_and_scipy_alone():
-    code = (
-        "import sys, mute.acoustics.sound_level_meter; "
-        "print([name for name in ('torch', 'tyro', 'rich', 'mujoco') if name in sys.modules])"
-    )
+@pytest.mark.parametrize(
+    ("module", "needless"),
+    [
+        ("mute.acoustics.sound_level_meter", ("torch", "tyro", "rich", "mujoco")),
+        ("mute.acoustics.meter", ("torch", "mujoco")),
+    ],
+)
+def test_the_meter_loads_nothing_of_simulation_and_learning(module, needless):
+    code = f"import sys, {module}; print([name for name in {needless} if name in sys.modules])"
     command = [sys.executable, "-c", code]
     run = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=True)
     assert run.stdout == "[]\n"
