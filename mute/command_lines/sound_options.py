@@ -12,8 +12,8 @@ import tyro
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from mute.acoustics import soundscape
 from mute.acoustics.microphone import Microphone
-from mute.acoustics.soundscape import SOURCES
 from mute.command_lines.arguments import Words, check_distinct
 from mute.controllers import load_policy
 from mute.controllers.learned import Policy
@@ -60,9 +60,10 @@ def check_sources(sources: Sequence[str]) -> None:
         MuteError: If there is none, one is not known, or one is named twice.
     """
     check_distinct("sources", sources)
-    for name in sources:
-        if name not in SOURCES:
-            raise MuteError(f"--sources must be of {', '.join(SOURCES)}, got {name!r}")
+    try:
+        soundscape.check_sources(sources)
+    except ValueError as error:
+        raise MuteError(f"--{error}") from error
 
 
 def find_microphone(text: str) -> Microphone:
