@@ -18,6 +18,7 @@ from envs.scene import Look, SceneError
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
 from mute.acoustics.soundscape import SOURCES
+from mute.acoustics.wav import has_samples
 from mute.checkpoint import latest_checkpoint
 from mute.command_lines.arguments import (
     REPOSITORY,
@@ -183,12 +184,21 @@ def _play(args: PlayArgs) -> tuple[Session, int]:
         print(f"interrupted after {session.seconds:.1f} s", file=sys.stderr)
         status = EXIT_INTERRUPTED
     if args.wav:
-        clipped = session.ear.clipped if session.ear else 0
-        note = f" ({clipped} samples are clipped)" if clipped else ""
-        print(f"sound: {args.wav}{note}", file=sys.stderr)
+        _tell_sound(args.wav, session)
     if not args.json:
         _print_summary(session, args.floor)
     return session, status
+
+
+def _tell_sound(path: Path, session: Session) -> None:
+    """Say what became of the file of the sound; one that never began is removed."""
+    if not (path.exists() and has_samples(path)):
+        path.unlink(missing_ok=True)
+        print(f"{path} is not written: the walk ended before its sound began", file=sys.stderr)
+        return
+    clipped = session.ear.clipped if session.ear else 0
+    note = f" ({clipped} samples are clipped)" if clipped else ""
+    print(f"sound: {path}{note}", file=sys.stderr)
 
 
 def _wants_window(args: PlayArgs) -> bool:
