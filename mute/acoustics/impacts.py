@@ -57,8 +57,12 @@ def contact_time(mass: ArrayLike, floor: Floor) -> NDArray[np.float64]:
         mass: Effective mass, kg. Any shape.
         floor: What it falls on.
     """
-    mass = np.asarray(mass, dtype=np.float64)
-    return np.pi * np.sqrt(mass / floor.contact_stiffness)
+    return _contact_time(np.asarray(mass, dtype=np.float64), floor.contact_stiffness)
+
+
+def _contact_time(mass: NDArray, stiffness: ArrayLike) -> NDArray[np.float64]:
+    """Return the same of the stiffness k, N/m; shapes broadcast."""
+    return np.pi * np.sqrt(mass / stiffness)
 
 
 def pulse_force(
@@ -193,7 +197,7 @@ class ImpactSound:
         pulses = np.stack(
             (
                 impacts.time + apart / SPEED_OF_SOUND,
-                np.pi * np.sqrt(impacts.mass / self._stiffness[impacts.floor]),
+                _contact_time(impacts.mass, self._stiffness[impacts.floor]),
                 self._gains[impacts.floor] * impulse / apart,
                 restitution,
             ),

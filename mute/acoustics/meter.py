@@ -33,9 +33,10 @@ from mute.acoustics.levels import P_REF, LevelDetector, Levels, TimeWeighting, s
 from mute.acoustics.loudness import zwicker_loudness
 from mute.acoustics.sound_level_meter import SAMPLES_AT_ONCE, SoundLevelMeter
 from mute.acoustics.wav import WavReader, read_wav
-from mute.acoustics.weighting import MIN_SAMPLE_RATE, AWeighting
+from mute.acoustics.weighting import MAX_SAMPLE_RATE, MIN_SAMPLE_RATE, AWeighting
+from mute.command_lines.arguments import command_line, parse
 from mute.errors import MuteError, run_cli
-from mute.evaluation.tables import without_nan
+from mute.plain_data import without_nan
 
 __all__ = ["MeterArgs", "main"]
 
@@ -87,8 +88,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         MuteError: If an argument or a file is bad.
     """
-    from mute.command_lines.arguments import command_line, parse  # loads torch, which takes seconds
-
     argv = command_line() if argv is None else list(argv)
     args = parse(MeterArgs, argv, "Measure the sound level of a recording.")
     _check(args)
@@ -151,12 +150,13 @@ def _open(path: Path) -> WavReader:
     """Open a recording.
 
     Raises:
-        MuteError: If it cannot be read, or has too low a sample rate.
+        MuteError: If it cannot be read, or its sample rate is too low or too high.
     """
     wav = WavReader(path)
-    if wav.sample_rate < MIN_SAMPLE_RATE:
+    if not MIN_SAMPLE_RATE <= wav.sample_rate <= MAX_SAMPLE_RATE:
         raise MuteError(
-            f"{path}: sample rate {wav.sample_rate} Hz, levels need {MIN_SAMPLE_RATE} Hz or more"
+            f"{path}: sample rate {wav.sample_rate} Hz, levels need {MIN_SAMPLE_RATE} to "
+            f"{MAX_SAMPLE_RATE} Hz"
         )
     return wav
 

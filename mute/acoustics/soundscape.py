@@ -42,9 +42,9 @@ def check_sources(sources: Sequence[str]) -> tuple[str, ...]:
     """
     for name in sources:
         if name not in SOURCES:
-            raise ValueError(f"source {name!r} is not known; use some of {', '.join(SOURCES)}")
+            raise ValueError(f"sources must be of {', '.join(SOURCES)}, got {name!r}")
     if not sources:
-        raise ValueError(f"sources must not be empty; use some of {', '.join(SOURCES)}")
+        raise ValueError(f"sources must be of {', '.join(SOURCES)}, got none")
     return tuple(sources)
 
 

@@ -30,6 +30,7 @@ __all__ = [
     "WavEncoding",
     "WavFormat",
     "WavReader",
+    "has_samples",
     "read_wav",
     "wav_header",
     "write_wav",
@@ -48,6 +49,9 @@ _FORMAT_BYTES = 40
 
 _BLOCK = 1 << 16
 """Samples a channel in a block."""
+
+_LARGEST = float(np.finfo(np.float32).max)
+"""Largest sample that is read: beyond it, sums of squares could overflow."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +133,7 @@ class WavReader:
             Samples, full scale is 1. Shape: (channels, <= length).
 
         Raises:
-            MuteError: If a sample is not a finite number, or the file has become shorter.
+            MuteError: If a sample is no number or above `_LARGEST`, or the file has become shorter.
         """
         done = 0
         while done < self.frames:
@@ -138,15 +142,16 @@ class WavReader:
             if len(data) < frames * self._format.frame_bytes:
                 raise MuteError(f"{self.path}: truncated while it was read")
             block = _decode(data, self._format).reshape(frames, self.channels).T
-            self._refuse_infinite(block, done)
+            self._refuse_unmeasurable(block, done)
             self.clipped += _at_full_scale(block, self._format)
             yield block
             done += frames
 
-    def _refuse_infinite(self, block: NDArray[np.float64], done: int) -> None:
-        if np.isfinite(block).all():
+    def _refuse_unmeasurable(self, block: NDArray[np.float64], done: int) -> None:
+        measurable = np.abs(block) <= _LARGEST  # which NaN is not
+        if measurable.all():
             return
-        channel, sample = np.argwhere(~np.isfinite(block))[0]
+        channel, sample = np.argwhere(~measurable)[0]
         raise MuteError(
             f"{self.path}: sample {done + sample} of channel {channel + 1} is "
             f"{block[channel, sample]}, not a number that can be measured"
@@ -164,6 +169,12 @@ def read_wav(path: Path) -> tuple[NDArray[np.float64], int]:
     """
     with WavReader(path) as wav:
         return np.concatenate(list(wav.blocks()), axis=1), wav.sample_rate
+
+
+def has_samples(path: Path) -> bool:
+    """Tell whether a WAV file that was written here holds any sample."""
+    header = wav_header(WavFormat(PCM, channels=1, sample_rate=1, bits=8, valid_bits=8), 0)
+    return path.stat().st_size > len(header)
 
 
 def write_wav(
@@ -220,12 +231,14 @@ def _read_header(file: BinaryIO, path: Path) -> tuple[WavFormat, int]:
         raise MuteError(f"{path}: broken WAV file: no format before the samples")
     there = size - file.tell()
     if length == _UNTIL_THE_END:
-        length = there
+        length = there - there % wav_format.frame_bytes  # the last byte may be padding
     if there < length:
         raise MuteError(
             f"{path}: truncated: {length} bytes of samples are promised, {there} are there"
         )
-    frames = length // wav_format.frame_bytes
+    frames, rest = divmod(length, wav_format.frame_bytes)
+    if rest:
+        raise MuteError(f"{path}: broken WAV file: its {length} bytes end within a sample")
     if frames == 0:
         raise MuteError(f"{path}: holds no samples")
     return wav_format, frames

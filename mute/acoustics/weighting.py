@@ -7,8 +7,9 @@ follows the standard's up to 20 kHz, or to half the sample rate where that is lo
 transform alone would be 8 dB too low at 16 kHz and a sample rate of 44.1 kHz.
 
 Largest deviation up to 20 kHz at sample rates of 44.1 kHz and more: 0.1 dB. At lower rates, down to
-8 kHz: 0.15 dB up to 95 % of half the sample rate, 0.4 dB above. Time weightings and levels are in
-`levels`.
+8 kHz: 0.15 dB up to 95 % of half the sample rate, 0.4 dB above. Above 192 kHz two zeros are fitted,
+which leave less than 0.0001 dB; with four the fit would be ill-conditioned. Time weightings and
+levels are in `levels`.
 """
 
 from __future__ import annotations
@@ -17,10 +18,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import signal
 
-__all__ = ["MIN_SAMPLE_RATE", "AWeighting", "a_weighting_db", "a_weighting_sos"]
+__all__ = ["MAX_SAMPLE_RATE", "MIN_SAMPLE_RATE", "AWeighting", "a_weighting_db", "a_weighting_sos"]
 
 MIN_SAMPLE_RATE = 8000
 """Lowest sample rate that a level is taken from, Hz; below, too little of the weighting is left."""
+
+MAX_SAMPLE_RATE = 768000
+"""Highest sample rate that a level is taken from, Hz: the highest that sound cards record at."""
 
 _POLES = (20.598997, 107.65265, 737.86223, 12194.217)
 """Pole frequencies f1 to f4, Hz (IEC 61672-1:2013, annex E); the first and last are double."""
@@ -32,7 +36,9 @@ _FIT_TO = 20000.0
 """Highest frequency of the fit, Hz: the end of what is heard."""
 
 _FIT_POINTS = 400
-_FITTED_ZEROS = 4
+
+_FOUR_ZEROS_UP_TO = 192000
+"""Sample rate up to which four zeros are fitted, Hz; above it, two."""
 
 _REST = 1e-150
 """A filter's state below this is nothing: its square is just above the slow denormal numbers."""
@@ -64,10 +70,12 @@ def a_weighting_sos(sample_rate: int) -> NDArray[np.float64]:
         Coefficients. Shape: (4, 6).
 
     Raises:
-        ValueError: If the sample rate is below `MIN_SAMPLE_RATE`.
+        ValueError: If the sample rate is not within `MIN_SAMPLE_RATE` and `MAX_SAMPLE_RATE`.
     """
-    if sample_rate < MIN_SAMPLE_RATE:
-        raise ValueError(f"sample_rate must be >= {MIN_SAMPLE_RATE} Hz, got {sample_rate}")
+    if not MIN_SAMPLE_RATE <= sample_rate <= MAX_SAMPLE_RATE:
+        raise ValueError(
+            f"sample_rate must be {MIN_SAMPLE_RATE} to {MAX_SAMPLE_RATE} Hz, got {sample_rate}"
+        )
     poles = np.exp(-2.0 * np.pi * np.array(_POLES) / sample_rate)
     high_pass = np.array(
         [
@@ -93,19 +101,24 @@ def _power(squared_frequency: NDArray[np.float64] | np.float64) -> NDArray[np.fl
 def _fitted_zeros(
     high_pass: NDArray[np.float64], pole: float, sample_rate: int
 ) -> NDArray[np.complex128]:
-    """Return the zeros that make the weighting of the high-pass part and a double pole."""
+    """Return the four zeros that make the weighting of the high-pass part and a double pole.
+
+    Those that are not fitted lie at z = 0.
+    """
+    fitted = 4 if sample_rate <= _FOUR_ZEROS_UP_TO else 2
     end = min(0.5 * sample_rate, _FIT_TO)
     frequencies = np.linspace(end / _FIT_POINTS, end, _FIT_POINTS)
     angles = 2.0 * np.pi * frequencies / sample_rate
     double_pole = np.abs(np.exp(1j * angles) - pole) ** 4
     rest = np.abs(_response(high_pass, angles)) ** 2 / double_pole
     target = 10.0 ** (a_weighting_db(frequencies) / 10.0) / rest
-    basis = np.polynomial.chebyshev.chebvander(np.cos(angles), _FITTED_ZEROS)
+    basis = np.polynomial.chebyshev.chebvander(np.cos(angles), fitted)
     series, *_ = np.linalg.lstsq(basis / target[:, None], np.ones(_FIT_POINTS), rcond=None)
     # With x = (z + 1/z) / 2, each root in x is a pair of zeros, one of them inside the circle.
     roots = np.polynomial.chebyshev.chebroots(series).astype(np.complex128)
     zeros = roots + np.sqrt(roots**2 - 1.0)
-    return np.where(np.abs(zeros) < 1.0, zeros, 1.0 / zeros)
+    inside = np.where(np.abs(zeros) < 1.0, zeros, 1.0 / zeros)
+    return np.append(inside, np.zeros(4 - fitted))
 
 
 def _response(sections: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray:
@@ -128,7 +141,7 @@ class AWeighting:
             sample_rate: Hz.
 
         Raises:
-            ValueError: If the sample rate is below `MIN_SAMPLE_RATE`.
+            ValueError: If the sample rate is not within `MIN_SAMPLE_RATE` and `MAX_SAMPLE_RATE`.
         """
         self._sections = a_weighting_sos(sample_rate)
         self._state: NDArray[np.float64] | None = None

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, TypeVar
 
-import torch
 import tyro
 
 from mute.errors import MuteError
@@ -25,7 +24,9 @@ __all__ = [
     "check_distinct",
     "check_seed",
     "check_trials",
+    "check_video",
     "check_wav",
+    "command_line",
     "make_directory",
     "parse",
     "resolve_device",
@@ -116,6 +117,8 @@ def resolve_device(device: str) -> str:
     """
     if device not in ("auto", "cpu", "cuda"):
         raise MuteError(f"--device must be auto, cpu or cuda, got {device!r}")
+    import torch  # takes seconds, and the meter needs none of it
+
     if device == "auto":
         return "cuda" if torch.cuda.is_available() else "cpu"
     if device == "cuda" and not torch.cuda.is_available():

@@ -7,8 +7,10 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import torch
+import tyro
 
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
@@ -26,11 +28,14 @@ from mute.command_lines.arguments import (
     make_directory,
 )
 from mute.command_lines.sound_options import (
+    MicrophonePlace,
+    Sources,
     check_sources,
     find_microphone,
     load_audible_policy,
     progress_bar,
     tell,
+    tell_kept,
 )
 from mute.errors import MuteError
 from mute.evaluation.noise import SETTLE_TIME, NoiseRow, NoiseSetting, measure_noise
@@ -44,6 +49,16 @@ __all__ = ["NoiseArgs", "SweepBetaArgs", "SweepSpeedArgs", "noise", "sweep_beta"
 _SPEEDS = tuple(round(0.1 * tenth, 1) for tenth in range(4, 11))
 _BETAS = tuple(round(0.1 * tenth, 1) for tenth in range(11))
 _MAX_ROBOTS = 1024
+_MAX_FILMS = 32
+"""Most films that are made side by side: each has a renderer and an encoder of its own, which take
+some 0.25 GB where the processor renders."""
+
+_FilmFile = Annotated[
+    Path | None,
+    tyro.conf.arg(
+        help="Film first trials, with that sound, to FILE.mp4, or to files named likewise."
+    ),
+]
 
 _Draw = Callable[[Sequence[NoiseRow], Path], list[Path]]
 
@@ -58,11 +73,8 @@ class _CommonArgs:
     """Measured length of a trial, s."""
     seed: int = 1
     """Seed of initial states and of the noise."""
-    sources: Words = SOURCES
-    """What to hear: impacts, scuffing, drive, fan."""
-    microphone: str = "trunk"
-    """Where to listen: trunk, or X,Y,Z of a listener who walks along, m forward, left, and up from
-    the ground under the robot: 0,1,1.2."""
+    sources: Sources = SOURCES
+    microphone: MicrophonePlace = "trunk"
     out: Path = Path("evaluation")
     """Directory of the files that are written."""
 
@@ -80,8 +92,7 @@ class NoiseArgs(_CommonArgs):
     wav: Path | None = None
     """Keep the sound of first trials: in FILE.wav where there is one floor and one beta, else in
     FILE-<surface>-beta<beta>.wav."""
-    video: Path | None = None
-    """Film first trials, with that sound, to FILE.mp4, or to files named likewise."""
+    video: _FilmFile = None
 
 
 @dataclass
@@ -97,8 +108,7 @@ class SweepSpeedArgs(_CommonArgs):
     wav: Path | None = None
     """Keep the sound of first trials: in FILE.wav where there is one speed and one beta, else in
     FILE-speed<speed>-beta<beta>.wav."""
-    video: Path | None = None
-    """Film first trials, with that sound, to FILE.mp4, or to files named likewise."""
+    video: _FilmFile = None
 
 
 @dataclass
@@ -114,8 +124,7 @@ class SweepBetaArgs(_CommonArgs):
     wav: Path | None = None
     """Keep the sound of first trials: in FILE.wav where there is one beta, else in
     FILE-speed<speed>-beta<beta>.wav."""
-    video: Path | None = None
-    """Film first trials, with that sound, to FILE.mp4, or to files named likewise."""
+    video: _FilmFile = None
 
 
 def noise(args: NoiseArgs) -> None:
@@ -173,6 +182,7 @@ def _run(
     _check(args, surfaces, args.beta, speeds)
     check_wav(args.wav)
     check_video(args.video)
+    _check_films(args.video, len(args.beta) * len(speeds))
     settings = [NoiseSetting(beta, speed) for beta in args.beta for speed in speeds]
     kept = [
         Recordings(wav, video, tell)
@@ -181,6 +191,7 @@ def _run(
     origin = sound_origin(args.policy)
     rows = _measure(name, args, surfaces, settings, kept)
     _report(name, args, rows, origin, draw)
+    tell_kept(kept)
 
 
 def _measure(
@@ -267,7 +278,8 @@ def _report(
     }
     write_json(args.out / f"{name}_about.json", about)
     figures = draw(rows, args.out) if draw else []
-    names = [f"{name}.json", f"{name}.csv", *(path.name for path in figures)]
+    data = [f"{name}.json", f"{name}.csv", f"{name}_about.json"]
+    names = [*data, *(path.name for path in figures)]
     print(f"written to {args.out}: {', '.join(names)}")
 
 
@@ -315,4 +327,17 @@ def _check(
         raise MuteError(
             f"--trials {args.trials} with {settings} settings is {settings * args.trials} robots; "
             f"at most {_MAX_ROBOTS} fit side by side"
+        )
+
+
+def _check_films(video: Path | None, settings: int) -> None:
+    """Check how many films are asked for.
+
+    Raises:
+        MuteError: If there are too many.
+    """
+    if video is not None and settings > _MAX_FILMS:
+        raise MuteError(
+            f"--video with {settings} settings is {settings} films; at most {_MAX_FILMS} are made "
+            "side by side"
         )

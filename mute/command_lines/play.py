@@ -18,10 +18,10 @@ from envs.scene import Look, SceneError
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
 from mute.acoustics.soundscape import SOURCES
+from mute.acoustics.wav import has_samples
 from mute.checkpoint import latest_checkpoint
 from mute.command_lines.arguments import (
     REPOSITORY,
-    Words,
     check_seed,
     check_video,
     check_wav,
@@ -29,7 +29,13 @@ from mute.command_lines.arguments import (
     parse,
 )
 from mute.command_lines.play_figures import live_captions, report, summary
-from mute.command_lines.sound_options import check_sources, find_microphone, progress_bar
+from mute.command_lines.sound_options import (
+    MicrophonePlace,
+    Sources,
+    check_sources,
+    find_microphone,
+    progress_bar,
+)
 from mute.controllers import LearnedController, load_policy
 from mute.controllers.learned import Policy
 from mute.errors import EXIT_INTERRUPTED, MuteError
@@ -87,11 +93,8 @@ class PlayArgs:
     """Floor to walk on and to hear, with physics at 1 ms: wood, carpet, tile or concrete. Unless
     given, training's floor and physics, with a level (modelled, sounding as wood); with --wav or
     --video, wood."""
-    sources: Words = SOURCES
-    """What to hear: impacts, scuffing, drive, fan."""
-    microphone: str = "trunk"
-    """Where to listen: trunk, or X,Y,Z of a listener who walks along, m forward, left, and up from
-    the ground under the robot: 0,1,1.2."""
+    sources: Sources = SOURCES
+    microphone: MicrophonePlace = "trunk"
     wav: Path | None = None
     """Keep the modelled sound of the first robot in this .wav file."""
     video: Path | None = None
@@ -181,12 +184,21 @@ def _play(args: PlayArgs) -> tuple[Session, int]:
         print(f"interrupted after {session.seconds:.1f} s", file=sys.stderr)
         status = EXIT_INTERRUPTED
     if args.wav:
-        clipped = session.ear.clipped if session.ear else 0
-        note = f" ({clipped} samples are clipped)" if clipped else ""
-        print(f"sound: {args.wav}{note}", file=sys.stderr)
+        _tell_sound(args.wav, session)
     if not args.json:
         _print_summary(session, args.floor)
     return session, status
+
+
+def _tell_sound(path: Path, session: Session) -> None:
+    """Say what became of the file of the sound; one that never began is removed."""
+    if not (path.exists() and has_samples(path)):
+        path.unlink(missing_ok=True)
+        print(f"{path} is not written: the walk ended before its sound began", file=sys.stderr)
+        return
+    clipped = session.ear.clipped if session.ear else 0
+    note = f" ({clipped} samples are clipped)" if clipped else ""
+    print(f"sound: {path}{note}", file=sys.stderr)
 
 
 def _wants_window(args: PlayArgs) -> bool:

@@ -4,30 +4,53 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Annotated
 
+import tyro
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from mute.acoustics import soundscape
 from mute.acoustics.microphone import Microphone
-from mute.acoustics.soundscape import SOURCES
-from mute.command_lines.arguments import check_distinct
+from mute.command_lines.arguments import Words, check_distinct
 from mute.controllers import load_policy
 from mute.controllers.learned import Policy
 from mute.errors import MuteError
 from mute.evaluation.listening import listening_cfg
+from mute.evaluation.recordings import Recordings
 
 __all__ = [
+    "MicrophonePlace",
+    "Sources",
     "check_sources",
     "find_microphone",
     "load_audible_policy",
     "progress_bar",
     "tell",
+    "tell_kept",
 ]
+
+Sources = Annotated[Words, tyro.conf.arg(help="What to hear: impacts, scuffing, drive, fan.")]
+"""Type of the option --sources."""
+
+MicrophonePlace = Annotated[
+    str,
+    tyro.conf.arg(
+        help="Where to listen: trunk, or X,Y,Z of a listener who walks along, m forward, left, and "
+        "up from the ground under the robot: 0,1,1.2; or world:X,Y,Z, a place that stays, from "
+        "where a walk begins: world:2,1,1.2. Trials of tables and sweeps walk off in all "
+        "directions."
+    ),
+]
+"""Type of the option --microphone."""
 
 _FARTHEST = 100.0
 """Largest coordinate of a microphone, m."""
+
+_WORLD = "world:"
+"""What stands before the place of a microphone that does not move."""
 
 
 def check_sources(sources: Sequence[str]) -> None:
@@ -37,9 +60,10 @@ def check_sources(sources: Sequence[str]) -> None:
         MuteError: If there is none, one is not known, or one is named twice.
     """
     check_distinct("sources", sources)
-    for name in sources:
-        if name not in SOURCES:
-            raise MuteError(f"--sources must be of {', '.join(SOURCES)}, got {name!r}")
+    try:
+        soundscape.check_sources(sources)
+    except ValueError as error:
+        raise MuteError(f"--{error}") from error
 
 
 def find_microphone(text: str) -> Microphone:
@@ -47,22 +71,25 @@ def find_microphone(text: str) -> Microphone:
 
     Args:
         text: `trunk`, or `X,Y,Z`: the place of a listener who walks along, m forward, to the left,
-            and up from the ground under the robot.
+            and up from the ground under the robot; or `world:X,Y,Z`: a place in the world, m.
 
     Raises:
-        MuteError: If it is neither, below the ground, or too far away.
+        MuteError: If it is none of these, below the ground, or too far away.
     """
     if text == "trunk":
         return Microphone()
+    place = text.removeprefix(_WORLD)
     try:
-        x, y, z = (float(part) for part in text.split(","))
+        x, y, z = (float(part) for part in place.split(","))
     except ValueError:
-        raise MuteError(f"--microphone must be trunk or X,Y,Z in m, got {text!r}") from None
+        raise MuteError(
+            f"--microphone must be trunk, X,Y,Z or {_WORLD}X,Y,Z in m, got {text!r}"
+        ) from None
     if not (all(abs(value) <= _FARTHEST for value in (x, y, z)) and z >= 0.0):
         raise MuteError(
             f"--microphone must be within {_FARTHEST:g} m and not below the ground, got {text!r}"
         )
-    return Microphone((x, y, z), "beside")
+    return Microphone((x, y, z), "beside" if place == text else "world")
 
 
 def load_audible_policy(path: Path) -> Policy:
@@ -99,3 +126,10 @@ def progress_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
 def tell(note: str) -> None:
     """Print a line on standard error."""
     print(note, file=sys.stderr)
+
+
+def tell_kept(recordings: Iterable[Recordings]) -> None:
+    """Print which sounds and films have been kept, if any."""
+    paths = [str(path) for walks in recordings for path in walks.kept]
+    if paths:
+        print(f"kept: {', '.join(paths)}")

@@ -14,7 +14,6 @@ from mute.acoustics.gains import load_gains
 from mute.acoustics.soundscape import SOURCES
 from mute.command_lines.arguments import (
     REPOSITORY,
-    Words,
     check_betas,
     check_seed,
     check_video,
@@ -22,11 +21,14 @@ from mute.command_lines.arguments import (
     make_directory,
 )
 from mute.command_lines.sound_options import (
+    MicrophonePlace,
+    Sources,
     check_sources,
     find_microphone,
     load_audible_policy,
     progress_bar,
     tell,
+    tell_kept,
 )
 from mute.controllers import LearnedController
 from mute.evaluation.course import Course, load_course
@@ -54,11 +56,8 @@ class WalkArgs:
     that different betas walk equally fast; unless given, the command is the course's speed."""
     seed: int = 1
     """Seed of the initial state and of the noise."""
-    sources: Words = SOURCES
-    """What to hear: impacts, scuffing, drive, fan."""
-    microphone: str = "trunk"
-    """Where to listen: trunk, or X,Y,Z of a listener who walks along, m forward, left, and up from
-    the ground under the robot: 0,1,1.2."""
+    sources: Sources = SOURCES
+    microphone: MicrophonePlace = "trunk"
     out: Path = Path("evaluation")
     """Directory of the files that are written."""
     wav: Path | None = None
@@ -85,6 +84,7 @@ def walk(args: WalkArgs) -> None:
     torch.set_num_threads(1)
     origin = sound_origin(args.policy)
     env = make_walk_env(policy.cfg.env, course, args.seed)
+    keep = _recordings(args)
     with progress_bar("walk", course.length) as advance:
         result = follow_course(
             env,
@@ -94,7 +94,7 @@ def walk(args: WalkArgs) -> None:
             gains,
             args.seed,
             args.hold_speed,
-            _recordings(args),
+            keep,
             advance,
             microphone=microphone,
             sources=args.sources,
@@ -102,6 +102,7 @@ def walk(args: WalkArgs) -> None:
     print(_story(result, course))
     files = _write(args, course, result, {"iteration": policy.iteration} | origin)
     print(f"written to {args.out}: {', '.join(files)}")
+    tell_kept([keep])
 
 
 def _recordings(args: WalkArgs) -> Recordings:

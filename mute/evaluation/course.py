@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mute.acoustics.floors import FLOORS
 from mute.errors import MuteError
+from mute.evaluation.path_following import MAX_SPEED
 
 __all__ = ["MARGIN", "Course", "FloorArea", "Point", "load_course"]
 
@@ -28,9 +29,6 @@ Point = tuple[float, float]
 MARGIN = 1.0
 """Distance from the path within which there must be floor, m: what a robot may stray, and half its
 length."""
-
-_MAX_SPEED = 1.0
-"""Fastest forward command that policies are trained on, m/s."""
 
 _MAX_COORDINATE = 1e4
 """Largest coordinate of a point, m: beyond, the physics would lose precision."""
@@ -122,8 +120,8 @@ def load_course(path: Path) -> Course:
 def _course(content: Any) -> Course:  # noqa: ANN401
     fields = _fields("the course", content, ("speed", "path", "floors"))
     speed = _number("speed", fields["speed"])
-    if not 0.0 < speed <= _MAX_SPEED:
-        raise _FieldError(f"speed must be above 0 and at most {_MAX_SPEED:g} m/s, got {speed:g}")
+    if not 0.0 < speed <= MAX_SPEED:
+        raise _FieldError(f"speed must be above 0 and at most {MAX_SPEED:g} m/s, got {speed:g}")
     waypoints = [
         _point(f"path[{index}]", value)
         for index, value in enumerate(_list("path", fields["path"], 2))

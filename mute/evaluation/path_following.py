@@ -19,9 +19,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-__all__ = ["PathFollower", "SpeedHold"]
+__all__ = ["MAX_SPEED", "PathFollower", "SpeedHold"]
 
-_MAX_SPEED = 1.0
+MAX_SPEED = 1.0
 """Fastest forward command that policies are trained on, m/s."""
 
 _MAX_TURN_RATE = 1.0
@@ -46,8 +46,8 @@ class PathFollower:
             ValueError: If there are less than two points, two that follow each other are the same,
                 or the speed or the look-ahead is out of its range.
         """
-        if not 0.0 < speed <= _MAX_SPEED:
-            raise ValueError(f"speed must be above 0 and at most {_MAX_SPEED:g}, got {speed}")
+        if not 0.0 < speed <= MAX_SPEED:
+            raise ValueError(f"speed must be above 0 and at most {MAX_SPEED:g}, got {speed}")
         if not 0.0 < look_ahead < math.inf:
             raise ValueError(f"look_ahead must be > 0, got {look_ahead}")
         if len(path) < 2:
@@ -144,7 +144,7 @@ class SpeedHold:
         gained, self._progress = progress - self._progress, progress
         # What was gained is not saved up: a cut corner must not slow the robot down after it.
         behind = max(self._behind - gained, 0.0)
-        asked = min(speed + self._gain * behind, _MAX_SPEED) if speed > 0.0 else speed
+        asked = min(speed + self._gain * behind, MAX_SPEED) if speed > 0.0 else speed
         # Nor does it grow once the fastest command is reached.
-        self._behind = behind + speed * self._step_dt if asked < _MAX_SPEED else behind
+        self._behind = behind + speed * self._step_dt if asked < MAX_SPEED else behind
         return asked

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from envs.quadruped_env import QuadrupedEnv
+from mute.acoustics.wav import has_samples
 from mute.rendering.sound_track import temporary_sound
 
 if TYPE_CHECKING:
@@ -26,13 +27,16 @@ class Recordings:
     video: Mapping[int, Path] = field(default_factory=dict)
     """Files for their films."""
     on_note: Callable[[str], None] = lambda note: None
-    """Told in one line of each file that is not as one would wish: clipped, or silent."""
+    """Told in one line of each file that is not as one would wish: clipped, silent, or
+    missing because the walk was too short."""
+    kept: list[Path] = field(default_factory=list)
+    """The files that are whole, once their walks are over."""
 
     def spaced(self, stride: int) -> Recordings:
         """Return the same with every index multiplied: of the first robots of groups."""
         wav = {index * stride: path for index, path in self.wav.items()}
         video = {index * stride: path for index, path in self.video.items()}
-        return Recordings(wav, video, self.on_note)
+        return Recordings(wav, video, self.on_note, self.kept)
 
     def note_clipped(self, samples: Mapping[int, int]) -> None:
         """Tell of each walk whose sound has samples beyond full scale, given their numbers."""
@@ -80,14 +84,34 @@ def filming(env: QuadrupedEnv, recordings: Recordings, start: float) -> Iterator
     }
     sounds = {**recordings.wav, **extra}
     videos: dict[int, Video] = {}
-    with contextlib.ExitStack() as stack:
-        for sound in extra.values():
-            stack.callback(sound.unlink, missing_ok=True)
-        for robot, path in recordings.video.items():
-            from mute.rendering.video import Video  # an encoder, which only a film needs
+    try:
+        with contextlib.ExitStack() as stack:
+            for robot, path in recordings.video.items():
+                from mute.rendering.video import Video  # an encoder, which only a film needs
 
-            videos[robot] = stack.enter_context(Video(path, env, sounds[robot], robot, start))
-        yield Filming(sounds, videos)
+                video = Video(path, env, sounds[robot], robot, start)
+                if robot in extra:
+                    stack.callback(extra[robot].unlink, missing_ok=True)
+                videos[robot] = stack.enter_context(video)
+            yield Filming(sounds, videos)
+    except KeyboardInterrupt:  # which keeps what there is
+        _finish(recordings, videos)
+        raise
+    _finish(recordings, videos)
+
+
+def _finish(recordings: Recordings, videos: Mapping[int, Video]) -> None:
+    """Drop sounds that never began, list what is kept, and tell of what is not as wished."""
+    for path in filter(Path.exists, recordings.wav.values()):
+        if has_samples(path):
+            recordings.kept.append(path)
+        else:
+            path.unlink()
+            recordings.on_note(f"{path} is not written: the walk ended before its sound began")
     for video in videos.values():
+        if video.never_began:
+            recordings.on_note(f"{video.path} is not written: the walk ended before it began")
+        else:
+            recordings.kept.append(video.path)
         if video.silent_because:
             recordings.on_note(f"{video.path} is without sound: {video.silent_because}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-__all__ = ["print_table", "read_json", "without_nan", "write_csv", "write_json"]
+from mute.plain_data import without_nan
+
+__all__ = ["print_table", "read_json", "write_csv", "write_json"]
 
 Row = Mapping[str, Any]
 
@@ -51,17 +52,6 @@ def write_json(path: Path, content: object) -> None:
 def read_json(path: Path) -> Any:  # noqa: ANN401
     """Return what a JSON file holds."""
     return json.loads(path.read_text())
-
-
-def without_nan(value: Any) -> Any:  # noqa: ANN401
-    """Return plain data with None for every number that is not finite."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, Mapping):
-        return {key: without_nan(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [without_nan(item) for item in value]
-    return value
 
 
 def _shown(value: Any) -> str:  # noqa: ANN401

@@ -64,6 +64,8 @@ class Video:
         self.path = path
         self.silent_because = ""
         """Why the sound is not in the complete file, in one line."""
+        self.never_began = False
+        """Whether the walk ended before the first picture, so that there is no file."""
         self._env = env
         self._sound = sound
         self._robot = robot
@@ -104,13 +106,15 @@ class Video:
         exc: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Complete the file, or remove it after an error.
+        """Complete the file, or remove it where nothing was filmed or after an error.
 
         Raises:
             MuteError: If the file cannot be completed.
         """
         self._renderer.close()
-        if self._pictures and (exc_type is None or issubclass(exc_type, KeyboardInterrupt)):
+        wanted = exc_type is None or issubclass(exc_type, KeyboardInterrupt)
+        self.never_began = wanted and self._pictures == 0
+        if wanted and self._pictures:
             try:
                 self._complete()
             except OSError as error:

@@ -29,6 +29,7 @@ PROMISED = {
     "pnl_std", "laeq_mean", "speed_mean", "velocity_error_sq", "landing_speed_rms", "apex_mean",
     "duty_factor", "stride_frequency", "power", "cost_of_transport",
 }  # fmt: skip
+TENTHS = ",".join(f"{0.1 * tenth:.1f}" for tenth in range(1, 12))
 
 
 def _row(beta: float, surface: str = "wood", speed: float = 0.5) -> NoiseRow:
@@ -68,16 +69,22 @@ def test_noise_prints_a_table_and_writes_csv_json_and_sound(tmp_path, capsys):
     wav = tmp_path / "walk.wav"
     arguments = ["noise", "--surface", "tile,carpet", "--trials", "1", "--seconds", "1.5"]
     assert evaluate.main([*arguments, "--out", str(tmp_path), "--wav", str(wav)]) == 0
-    assert "modelled" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "modelled" in shown
     rows = _read_back(tmp_path, "noise")
     assert [(row["surface"], row["beta"]) for row in rows] == [
         ("tile", 0.0), ("tile", 1.0), ("carpet", 0.0), ("carpet", 1.0)
     ]  # fmt: skip
     assert rows[0]["mnl_std"] is None  # one trial has no spread
-    for name in ("tile-beta0", "tile-beta1", "carpet-beta0", "carpet-beta1"):
-        with wave.open(str(tmp_path / f"walk-{name}.wav")) as file:
+    names = ("tile-beta0", "tile-beta1", "carpet-beta0", "carpet-beta1")
+    kept = [tmp_path / f"walk-{name}.wav" for name in names]
+    for path in kept:
+        with wave.open(str(path)) as file:
             assert file.getnframes() == 1.5 * file.getframerate()
     assert not wav.exists()
+    written, last = shown.splitlines()[-2:]
+    assert written == f"written to {tmp_path}: noise.json, noise.csv, noise_about.json"
+    assert last == f"kept: {', '.join(map(str, kept))}"
 
 
 def test_the_sweeps_write_figures_with_the_data_beside(tmp_path):
@@ -125,6 +132,11 @@ def test_a_listener_and_the_sources_come_to_the_measurement(asked, tmp_path):
     assert [call["surface"] for call in asked] == ["wood", "carpet", "tile"]
     assert asked[0]["microphone"] == Microphone((-0.5, -1.0, 1.2), "beside")
     assert asked[0]["sources"] == ("impacts", "drive")
+
+
+def test_a_microphone_can_stand_in_the_world(asked, tmp_path):
+    evaluate.main(["noise", "--microphone", "world:2,-1.5,1.2", "--out", str(tmp_path)])
+    assert asked[0]["microphone"] == Microphone((2.0, -1.5, 1.2), "world")
 
 
 def test_clipped_samples_are_a_line_on_standard_error(monkeypatch, tmp_path, capsys):
@@ -194,6 +206,9 @@ def test_a_walk_takes_sources_and_microphone_and_commands_the_course_speed(monke
         (["noise", "--sources", ""], ["--sources", "none"]),
         (["noise", "--sources", "fan,fan"], ["--sources", "fan again"]),
         (["noise", "--microphone", "ceiling"], ["--microphone", "X,Y,Z", "'ceiling'"]),
+        (["noise", "--microphone", "world:"], ["world:X,Y,Z", "'world:'"]),
+        (["noise", "--microphone", "world:trunk"], ["world:X,Y,Z", "'world:trunk'"]),
+        (["noise", "--microphone", "world:0,0,-1"], ["below the ground", "'world:0,0,-1'"]),
         (["noise", "--microphone", "0,1"], ["--microphone", "X,Y,Z", "'0,1'"]),
         (["walk", "--microphone", "0,nan,1"], ["--microphone", "'0,nan,1'"]),
         (["noise", "--microphone", "0,1,-0.2"], ["--microphone", "below the ground"]),
@@ -201,6 +216,10 @@ def test_a_walk_takes_sources_and_microphone_and_commands_the_course_speed(monke
         (["noise", "--wav", "walk.mp3"], ["--wav", "'walk.mp3'"]),
         (["sweep-beta", "--video", "walk.avi"], ["--video", "'walk.avi'"]),
         (["walk", "--video", "walk"], ["--video", "'walk'"]),
+        (
+            ["sweep-speed", "--beta", "0,0.5,1", "--speed", TENTHS, "--video", "walk.mp4"],
+            ["--video", "33 films", "at most 32"],
+        ),
         (["walk", "--wav", "walk"], ["--wav", "'walk'"]),
         (["sweep-speed", "--speed", "0"], ["--speed", "0"]),
         (["sweep-speed", "--speed", ""], ["--speed", "none"]),

@@ -218,6 +218,20 @@ def test_a_sound_that_cannot_be_written_is_told_by_its_path(policy, tmp_path):
         main(["--viewer", "none", "--policy", str(policy), "--wav", str(path), "--json"])
 
 
+def test_a_walk_stopped_at_once_leaves_no_sound_and_says_so(policy, tmp_path, monkeypatch, capsys):
+    def stop(session):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Session, "step", stop)
+    path = tmp_path / "walk.wav"
+    words = ["--viewer", "none", "--policy", str(policy), "--wav", str(path), "--json"]
+    assert main(words) == 130
+    assert f"{path} is not written: the walk ended before its sound began\n" in (
+        capsys.readouterr().err
+    )
+    assert not path.exists()
+
+
 # -- what is walked and what is reported ---------------------------------------------------------
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -17,7 +18,7 @@ from tensordict import TensorDict
 
 from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
 from mute.acoustics.listener import SAMPLE_RATE
-from mute.acoustics.wav import write_wav
+from mute.acoustics.wav import read_wav, write_wav
 from mute.checkpoint import save_checkpoint
 from mute.command_lines.arguments import REPOSITORY
 from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
@@ -206,11 +207,10 @@ def test_a_sound_that_cannot_be_read_leaves_the_film_as_it_was(film):
     assert sorted(film.parent.iterdir()) == [wav, film]
 
 
-def test_evaluate_films_the_first_trial_of_each_setting_with_its_sound(tmp_path, environ):
-    words = ("noise", "--surface", "wood", "--beta", "0,1", "--trials", "1", "--seconds", "1.2")
-    files = ("--video", str(tmp_path / "walk.mp4"), "--out", str(tmp_path / "out"))
+def _evaluate(environ: dict[str, str], *words: str | Path) -> str:
+    """Return what `evaluate.py` prints on standard output."""
     run = subprocess.run(
-        [sys.executable, "evaluate.py", *words, *files],
+        [sys.executable, "evaluate.py", *map(str, words)],
         cwd=REPOSITORY,
         env={key: value for key, value in environ.items() if key != "MUJOCO_GL"},
         capture_output=True,
@@ -218,6 +218,12 @@ def test_evaluate_films_the_first_trial_of_each_setting_with_its_sound(tmp_path,
         check=False,
     )
     assert run.returncode == 0, run.stderr
+    return run.stdout
+
+
+def test_evaluate_films_the_first_trial_of_each_setting_with_its_sound(tmp_path, environ):
+    words = ("noise", "--surface", "wood", "--beta", "0,1", "--trials", "1", "--seconds", "1.2")
+    _evaluate(environ, *words, "--video", tmp_path / "walk.mp4", "--out", tmp_path / "out")
     paths = [tmp_path / f"walk-wood-beta{beta}.mp4" for beta in (0, 1)]
     assert sorted(tmp_path.iterdir()) == [tmp_path / "out", *paths]
     levels = []
@@ -231,6 +237,35 @@ def test_evaluate_films_the_first_trial_of_each_setting_with_its_sound(tmp_path,
         assert len(sound) / SAMPLE_RATE == pytest.approx(1.2, abs=0.03)
         levels.append(float(np.sqrt(np.mean(sound**2))))
     assert levels[0] > 1.4 * levels[1] > 0.0
+
+
+def test_a_sweep_keeps_the_sound_that_it_puts_into_a_film(tmp_path, environ):
+    words = ("sweep-speed", "--speed", "0.5", "--beta", "1", "--trials", "1", "--seconds", "1.04")
+    wav, film, out = tmp_path / "walk.wav", tmp_path / "walk.mp4", tmp_path / "out"
+    shown = _evaluate(environ, *words, "--wav", wav, "--video", film, "--out", out)
+    assert f"kept: {wav}, {film}\n" in shown
+    assert sorted(tmp_path.iterdir()) == [out, film, wav]
+    kept, rate = read_wav(wav)
+    assert kept.shape[1] == round(1.04 * rate)
+    heard = _sound_of(film)[: kept.shape[1]]
+    assert np.std(heard) == pytest.approx(np.std(kept), rel=0.05)  # AAC is lossy
+
+
+def test_a_walk_over_a_course_is_filmed_with_its_sound(tmp_path, environ):
+    course, film, out = tmp_path / "course.yaml", tmp_path / "walk.mp4", tmp_path / "out"
+    course.write_text(
+        "speed: 0.5\npath: [[0, 0], [0.6, 0]]\n"
+        "floors: [{floor: tile, low: [-1, -1], high: [2, 1]}]\n"
+    )
+    shown = _evaluate(environ, "walk", "--course", course, "--video", film, "--out", out)
+    assert f"kept: {film}\n" in shown
+    assert sorted(tmp_path.iterdir()) == [course, out, film]
+    filmed = json.loads((out / "walk.json").read_text())["seconds"] - 1.0
+    rate = imageio.immeta(film)["fps"]
+    assert len(imageio.imread(film)) / rate == pytest.approx(filmed, abs=1.5 / rate)
+    sound = _sound_of(film)
+    assert len(sound) / SAMPLE_RATE == pytest.approx(filmed, abs=0.03)
+    assert np.std(sound) > 0.0
 
 
 # -- backends ------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ import torch
 import yaml
 
 from mute.acoustics.listener import WAV_FULL_SCALE
+from mute.acoustics.microphone import Microphone
 from mute.acoustics.sound_level_meter import measure
 from mute.acoustics.wav import read_wav
 from mute.command_lines import evaluate
@@ -152,9 +153,13 @@ def test_a_fall_ends_the_walk_where_the_robot_fell():
     assert result.track.time[-1] <= result.seconds
 
 
-def test_a_fall_before_the_first_reading_has_no_level():
+def test_a_fall_before_the_first_reading_has_no_level_and_no_sound(tmp_path):
     env = make_walk_env(load_policy(POLICY).cfg.env, STRAIGHT, seed=1)
-    result = follow_course(env, _Falling(env, step=5), STRAIGHT, beta=0.0)
+    notes = []
+    keep = Recordings({0: tmp_path / "fall.wav"}, on_note=notes.append)
+    result = follow_course(env, _Falling(env, step=5), STRAIGHT, beta=0.0, keep=keep)
+    assert list(tmp_path.iterdir()) == []
+    assert "fall.wav is not written: the walk ended before" in notes[0]
     assert result.end == "fell"
     assert math.isnan(result.mnl)
     assert (len(result.track.time), result.floors) == (0, ())
@@ -166,6 +171,11 @@ def test_a_robot_that_falls_behind_is_asked_for_more_only_where_the_speed_is_hel
     assert held.command_mean > 0.37
     assert left.command_mean < 0.3601
     assert left.seconds > held.seconds
+
+
+def test_a_robot_gets_louder_as_it_walks_up_to_a_microphone_that_stands_in_the_world():
+    levels = _walk(STRAIGHT, microphone=Microphone((1.0, 0.0, 0.3), "world")).track.level
+    assert levels[-10:].mean() > levels[:10].mean() + 3.0
 
 
 def test_a_walk_is_given_up_after_twice_the_time_that_it_should_take():
@@ -203,6 +213,7 @@ def test_the_command_writes_figures_track_map_and_sound(tmp_path, capsys):
         assert file.getnframes() / file.getframerate() == pytest.approx(content["seconds"] - 1.0)
     shown = capsys.readouterr().out
     assert "arrived after 1.6 m" in shown
+    assert shown.endswith(f"kept: {wav}\n")
     assert "modelled" in shown
 
 

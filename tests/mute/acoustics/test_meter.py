@@ -311,10 +311,21 @@ def test_arguments_that_do_not_fit_are_refused_by_name(recording, arguments, nam
         meter.main([str(recording), *arguments])
 
 
-def test_a_sample_rate_below_the_lowest_is_refused(tmp_path):
-    write_wav(tmp_path / "low.wav", tone(0.1, rate=4000), 4000)
-    with pytest.raises(MuteError, match=r"low\.wav: sample rate 4000 Hz"):
-        meter.main([str(tmp_path / "low.wav")])
+@pytest.mark.parametrize("rate", [4000, 768001, 2**32 - 1])
+def test_a_sample_rate_that_no_level_is_taken_from_is_refused(tmp_path, rate):
+    path = tmp_path / "odd.wav"
+    write_wav(path, tone(0.1), RATE)
+    content = path.read_bytes()
+    path.write_bytes(content[:24] + rate.to_bytes(4, "little") + content[28:])  # in the header
+    expected = rf"odd\.wav: sample rate {rate} Hz, levels need 8000 to 768000 Hz"
+    with pytest.raises(MuteError, match=expected):
+        meter.main([str(path)])
+
+
+def test_the_highest_sample_rate_is_measured(capsys, tmp_path):
+    write_wav(tmp_path / "high.wav", tone(0.1, rate=768000), 768000)
+    figures, _ = run(capsys, tmp_path / "high.wav")
+    assert figures["laeq"] == pytest.approx(-20.0, abs=0.01)
 
 
 def test_the_lines_say_what_is_calibrated_and_what_is_not(capsys, recording, calibration):
@@ -383,11 +394,15 @@ def test_a_tone_of_1_khz_has_the_loudness_that_defines_the_sone(level):
     assert loudness.maximum == pytest.approx(sone, rel=0.05)
 
 
-def test_the_meter_for_arrays_needs_numpy_and_scipy_alone():
-    code = (
-        "import sys, mute.acoustics.sound_level_meter; "
-        "print([name for name in ('torch', 'tyro', 'rich', 'mujoco') if name in sys.modules])"
-    )
+@pytest.mark.parametrize(
+    ("module", "needless"),
+    [
+        ("mute.acoustics.sound_level_meter", ("torch", "tyro", "rich", "mujoco")),
+        ("mute.acoustics.meter", ("torch", "mujoco")),
+    ],
+)
+def test_the_meter_loads_nothing_of_simulation_and_learning(module, needless):
+    code = f"import sys, {module}; print([name for name in {needless} if name in sys.modules])"
     command = [sys.executable, "-c", code]
     run = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=True)
     assert run.stdout == "[]\n"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from mute.acoustics.wav import WavReader, read_wav, write_wav
+from mute.acoustics.wav import WavReader, has_samples, read_wav, write_wav
 from mute.errors import MuteError
 
 SAMPLES = np.array([[0.0, 0.5, -0.5, 0.25], [-1.0, 0.125, 0.75, 0.0]])
@@ -41,6 +41,13 @@ def test_what_is_written_is_read_back(tmp_path, encoding, step, channels):
     back, sample_rate = read_wav(path)
     assert sample_rate == 44100
     np.testing.assert_allclose(back, samples, atol=step)
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_file_without_samples_is_known(tmp_path, count):
+    path = tmp_path / "file.wav"
+    write_wav(path, np.zeros(count), 48000, "int16")
+    assert has_samples(path) is bool(count)
 
 
 @pytest.mark.parametrize("encoding", ["float32", "int16", "int24"])
@@ -91,7 +98,7 @@ def test_other_chunks_before_the_samples_are_passed_over(tmp_path):
 
 
 def test_a_file_from_a_pipe_goes_on_to_its_end(tmp_path):
-    content = wav_bytes(1, 16, struct.pack("<2h", 1 << 14, 0), promised=0xFFFFFFFF)
+    content = wav_bytes(1, 16, struct.pack("<2h", 1 << 14, 0) + b"\0", promised=0xFFFFFFFF)
     back, _ = read_wav(write(tmp_path, content))
     np.testing.assert_array_equal(back, [[0.5, 0.0]])
 
@@ -144,6 +151,9 @@ WHOLE = wav_bytes(1, 16, bytes(100))
         (wav_bytes(1, 16, bytes(4), rate=0), "broken WAV file: 1 channels at a sample rate of 0"),
         (wav_bytes(3, 32, struct.pack("<3f", 0, np.nan, 0)), "sample 1 of channel 1 is nan"),
         (wav_bytes(3, 32, struct.pack("<2f", 0, -np.inf), 2), "sample 0 of channel 2 is -inf"),
+        (wav_bytes(3, 64, struct.pack("<2d", 0, -1e200)), "sample 1 of channel 1 is -1e+200, not"),
+        (wav_bytes(1, 16, bytes(101)), "broken WAV file: its 101 bytes end within a sample"),
+        (wav_bytes(1, 16, bytes(102), channels=2), "its 102 bytes end within a sample"),
     ],
 )
 def test_a_bad_file_is_refused_with_its_name_and_the_reason_in_one_line(tmp_path, content, reason):
