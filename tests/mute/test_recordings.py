@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
-from mute.acoustics.listener import WavFile
+from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
+from mute.acoustics.wav_file import WavFile
 from mute.errors import MuteError
 from mute.evaluation.recordings import Recordings, filming
 
@@ -32,7 +33,7 @@ def test_what_never_began_leaves_no_file_and_is_told(env, tmp_path, stopped):
 
     def walk():
         with filming(env, wanted, start=1.0) as films:
-            WavFile(films.sounds[0]).close()
+            WavFile(films.sounds[0], SAMPLE_RATE, WAV_FULL_SCALE).close()
             films.record()  # of a tenth of the time after which the film begins
             if stopped:
                 raise KeyboardInterrupt
