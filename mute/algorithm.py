@@ -9,6 +9,7 @@ from rsl_rl.algorithms import PPO
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
+from mute.distributed import Ranks
 from mute.estimated_env import EstimatedEnv
 from mute.estimation import EstimatorTrainer
 from mute.storage import PreparedModel, PreparedStorage
@@ -29,6 +30,8 @@ class EstimatorPPO(PPO):
     """Where the estimator runs."""
     trainer: EstimatorTrainer
     """What the estimator learns by."""
+    ranks: Ranks
+    """Processes that learn together."""
 
     @staticmethod
     def construct_algorithm(obs: TensorDict, env: VecEnv, cfg: dict, device: str) -> EstimatorPPO:
@@ -42,12 +45,12 @@ class EstimatorPPO(PPO):
         algorithm.storage = storage
         return algorithm
 
-    def attach(self, env: EstimatedEnv, trainer: EstimatorTrainer) -> None:
+    def attach(self, env: EstimatedEnv, trainer: EstimatorTrainer, ranks: Ranks) -> None:
         """Take on the estimator; to be called once, before anything else.
 
         A live module cannot come through rsl_rl's configuration, which is deep-copied.
         """
-        self.env, self.trainer = env, trainer
+        self.env, self.trainer, self.ranks = env, trainer, ranks
         self._rollout_state: State = env.state_before
 
     def act(self, obs: TensorDict) -> torch.Tensor:
@@ -57,14 +60,26 @@ class EstimatorPPO(PPO):
             use_collection_threads()
         return super().act(obs)
 
+    def compute_returns(self, obs: TensorDict) -> None:
+        """Compute returns and advantages, see `PPO.compute_returns`.
+
+        rsl_rl normalises the advantages of each rank by themselves; here it is those of all.
+        """
+        super().compute_returns(obs)
+        if not self.ranks.several:
+            return
+        advantages = self.storage.returns - self.storage.values
+        count = advantages.numel() * self.ranks.world_size
+        centred = advantages - self.ranks.mean(advantages.mean())
+        variance = self.ranks.mean(centred.square().mean()) * count / (count - 1)
+        self.storage.advantages = centred / (variance.sqrt() + 1e-8)
+
     def update(self) -> dict[str, float]:
         """Train the estimator, then actor and critic; return the mean losses and errors."""
         use_learning_threads()
         # Clones made outside inference mode are ordinary tensors, which autograd accepts.
         hidden, cell = self._rollout_state
-        losses = self.trainer.update(
-            self.storage, (hidden.clone(), cell.clone()), self.gpu_world_size
-        )
+        losses = self.trainer.update(self.storage, (hidden.clone(), cell.clone()), self.ranks)
         losses |= super().update()
         self.env.refresh()
         return losses

@@ -111,17 +111,20 @@ def latest_checkpoint(log_dir: Path, task: str | None = None) -> Path:
     Raises:
         CheckpointError: There is none.
     """
-    newest: dict[Path, tuple[int, Path]] = {}
-    for path in log_dir.glob(f"{glob.escape(task) if task else '*'}/*/model_*.pt"):
-        match = re.fullmatch(r"model_(\d+)\.pt", path.name)
-        if match and path.is_file():
-            candidate = (int(match[1]), path)
-            newest[path.parent] = max(newest.get(path.parent, candidate), candidate)
+    runs = log_dir.glob(f"{glob.escape(task) if task else '*'}/*/")
+    newest = {run: path for run in runs if (path := newest_checkpoint(run)) is not None}
     if not newest:
         raise CheckpointError(f"no checkpoint under {log_dir / (task or '')}; start a run first")
     # The name decides between directories of the same instant.
     run = max(newest, key=lambda directory: (directory.stat().st_mtime_ns, directory.name))
-    return newest[run][1]
+    return newest[run]
+
+
+def newest_checkpoint(run: Path) -> Path | None:
+    """Return the checkpoint of a run with the highest iteration; None if it has none."""
+    named = ((re.fullmatch(r"model_(\d+)\.pt", path.name), path) for path in run.iterdir())
+    found = [(int(match[1]), path) for match, path in named if match and path.is_file()]
+    return max(found)[1] if found else None
 
 
 def _check_plain(value: object, place: str) -> None:

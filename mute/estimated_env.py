@@ -117,6 +117,17 @@ class EstimatedEnv(VecEnv):
         )
         published.copy_(estimate_group(self._estimate, self.estimator, self.with_phase))
 
+    def restart(self, step_count: int) -> None:
+        """Begin new episodes of all robots in the middle of a training.
+
+        Args:
+            step_count: Control steps trained so far, by which the curricula go.
+        """
+        self.env.step_count = step_count
+        observations = self.env.reset()
+        use_learning_threads()
+        self._consume(observations, self.estimator.initial_state(self.num_envs, self.device))
+
     def state_dict(self) -> dict[str, Any]:
         """Return all that is needed to continue bit for bit, the environment included."""
         return {

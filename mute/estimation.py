@@ -11,12 +11,12 @@ from typing import Any
 
 import torch
 from rsl_rl.storage import RolloutStorage
-from rsl_rl.utils import reduce_gradients_in_buckets
 from torch import Tensor, nn
 
 from envs.phase import hindsight_phase
 from envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE
 from mute.config import EstimationCfg
+from mute.distributed import Ranks
 from networks.estimator import Estimate, Estimator, State
 
 __all__ = ["EstimatorTrainer", "Labels", "Losses", "estimator_losses"]
@@ -65,7 +65,11 @@ class Losses:
 
 
 def estimator_losses(
-    estimate: Estimate, next_obs_hat: Tensor, labels: Labels, cfg: EstimationCfg
+    estimate: Estimate,
+    next_obs_hat: Tensor,
+    labels: Labels,
+    cfg: EstimationCfg,
+    ranks: Ranks | None = None,
 ) -> Losses:
     """Return the losses of a batch of sequences.
 
@@ -75,18 +79,22 @@ def estimator_losses(
         labels: Truth.
         cfg: Weights, and the scale in which heights are counted: metres would make their share of
             the loss vanish.
+        ranks: Processes whose mean loss is meant: a sample then weighs the same wherever it is.
     """
+    ranks = ranks or Ranks()
+    counts = torch.stack((labels.next_valid.sum(), labels.phase_closed.sum())).float()
+    num_valid, num_closed = ranks.mean(counts).clamp(min=1.0 / ranks.world_size)
     velocity_error = (estimate.base_lin_vel - labels.base_lin_vel).square().mean()
     height_error = (estimate.heights - labels.heights).square().mean()
     estimation = velocity_error + height_error / cfg.network.height_scale**2
     reconstruction = _masked_mean(
-        (next_obs_hat - labels.next_obs).square().mean(dim=-1), labels.next_valid
+        (next_obs_hat - labels.next_obs).square().mean(dim=-1), labels.next_valid, num_valid
     )
     mean, log_var = estimate.latent_mean, estimate.latent_log_var
     divergence = 0.5 * (mean.square() + log_var.exp() - 1.0 - log_var).sum(dim=-1).mean()
     forward = reconstruction + cfg.lambda_kl * divergence
     difference = estimate.phase - labels.phase
-    phase = _masked_mean(difference.square(), labels.phase_closed)
+    phase = _masked_mean(difference.square(), labels.phase_closed, num_closed)
     return Losses(
         total=estimation + cfg.lambda_fwd * forward + cfg.lambda_phase * phase,
         estimation=estimation,
@@ -94,12 +102,12 @@ def estimator_losses(
         phase=phase,
         velocity_rmse=velocity_error.detach().sqrt(),
         height_rmse=height_error.detach().sqrt(),
-        phase_mae=_masked_mean(difference.detach().abs(), labels.phase_closed),
+        phase_mae=_masked_mean(difference.detach().abs(), labels.phase_closed, num_closed),
     )
 
 
-def _masked_mean(value: Tensor, mask: Tensor) -> Tensor:
-    return (value * mask).sum() / mask.sum().clamp(min=1)
+def _masked_mean(value: Tensor, mask: Tensor, count: Tensor) -> Tensor:
+    return (value * mask).sum() / count
 
 
 class EstimatorTrainer:
@@ -130,14 +138,14 @@ class EstimatorTrainer:
         self._past: dict[str, Tensor] = {}
 
     def update(
-        self, storage: RolloutStorage, initial_state: State, world_size: int = 1
+        self, storage: RolloutStorage, initial_state: State, ranks: Ranks | None = None
     ) -> dict[str, float]:
         """Learn from the rollout before the one in the storage, and remember the latter.
 
         Args:
             storage: The rollout just collected.
             initial_state: LSTM state before its first observation.
-            world_size: Number of processes whose gradients are averaged.
+            ranks: Processes that learn together.
 
         Returns:
             Losses and errors by name; empty after the first rollout, which only waits.
@@ -150,7 +158,7 @@ class EstimatorTrainer:
             return {}
         # Contacts before the window tell when its first segments began.
         current["contact_before"], current["starts_before"] = past["contact"], past["starts"]
-        return self._learn(past, self._labels(past, current), world_size)
+        return self._learn(past, self._labels(past, current), ranks or Ranks())
 
     def state_dict(self) -> dict[str, Any]:
         """Return the optimiser and the rollout that waits for its labels."""
@@ -197,7 +205,7 @@ class EstimatorTrainer:
             next_valid=~past["dones"],
         )
 
-    def _learn(self, past: dict[str, Tensor], labels: Labels, world_size: int) -> dict[str, float]:
+    def _learn(self, past: dict[str, Tensor], labels: Labels, ranks: Ranks) -> dict[str, float]:
         starts = past["starts"]
         num_envs = starts.shape[1]
         sums: dict[str, float] = {}
@@ -208,11 +216,10 @@ class EstimatorTrainer:
                 past["obs"][:, env_ids], state, starts[:, env_ids], sample=True
             )
             decoded = self.estimator.decode(estimate.latent)
-            losses = estimator_losses(estimate, decoded, labels.select(env_ids), self.cfg)
+            losses = estimator_losses(estimate, decoded, labels.select(env_ids), self.cfg, ranks)
             self.optimizer.zero_grad()
             losses.total.backward()
-            if world_size > 1:
-                reduce_gradients_in_buckets(self.estimator.parameters(), world_size, 25.0)
+            ranks.average_gradients(self.estimator.parameters())
             nn.utils.clip_grad_norm_(self.estimator.parameters(), self.cfg.max_grad_norm)
             self.optimizer.step()
             for name, value in vars(losses).items():

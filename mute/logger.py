@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import statistics
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -22,9 +23,10 @@ from rsl_rl.utils import LogWriter
 from rsl_rl.utils.logger import Logger
 from torch.utils.tensorboard import SummaryWriter
 
+from mute.distributed import Ranks
 from mute.files import replace_file
 
-__all__ = ["CurveWriter", "LiveDisplay", "PlainDisplay", "TrainingLogger"]
+__all__ = ["CurveWriter", "LiveDisplay", "MeanCurves", "PlainDisplay", "TrainingLogger"]
 
 _COLUMNS = {
     "Perf/total_fps": ("steps/s", "{:,.0f}"),
@@ -82,6 +84,35 @@ class CurveWriter(LogWriter):
         self._tensorboard.close()
 
 
+class MeanCurves(LogWriter):
+    """Takes every rank's scalars; the first writes each one's mean over the ranks that have it."""
+
+    def __init__(self, ranks: Ranks, curves: CurveWriter | None) -> None:
+        """Take what the first rank writes to; the others have nothing."""
+        self._ranks, self._curves = ranks, curves
+        self._own: dict[str, float] = {}
+
+    def add_scalar(self, tag: str, scalar_value: float, global_step: int) -> None:
+        """Keep a scalar until the end of the iteration."""
+        self._own[tag] = float(scalar_value)
+
+    def end_iteration(self, iteration: int) -> dict[str, float]:
+        """Write the means and return them; the other ranks return nothing."""
+        own, self._own = self._own, {}
+        of_ranks = self._ranks.gather(own)
+        if self._curves is None:
+            return {}
+        for tag in dict.fromkeys(tag for scalars in of_ranks for tag in scalars):
+            values = [scalars[tag] for scalars in of_ranks if tag in scalars]
+            self._curves.add_scalar(tag, statistics.fmean(values), iteration)
+        return self._curves.end_iteration(iteration)
+
+    def stop(self) -> None:
+        """Close the files."""
+        if self._curves is not None:
+            self._curves.stop()
+
+
 class TrainingLogger(Logger):
     """rsl_rl's logger with the console page replaced by a callback."""
 
@@ -90,6 +121,7 @@ class TrainingLogger(Logger):
         *args: Any,  # noqa: ANN401
         measure: Callable[[int], dict[str, float]],
         on_iteration: Callable[[int, int, dict[str, float]], None],
+        ranks: Ranks,
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
         """Prepare to log.
@@ -98,16 +130,27 @@ class TrainingLogger(Logger):
             *args: What `Logger` takes.
             measure: Called with an iteration; returns further scalars for its curves.
             on_iteration: Called with (iteration, total, scalars) at the end of each.
+            ranks: Processes whose mean figures are logged.
             **kwargs: What `Logger` takes.
         """
-        super().__init__(*args, **kwargs)
+        super().__init__(
+            *args,
+            is_distributed=ranks.several,
+            gpu_world_size=ranks.world_size,
+            gpu_global_rank=ranks.rank,
+            **kwargs,
+        )
         self._measure = measure
         self._on_iteration = on_iteration
+        self._ranks = ranks
 
     def init_logging_writer(self) -> None:
         """Open the curves, quietly."""
         with contextlib.redirect_stdout(io.StringIO()):
             super().init_logging_writer()
+        if self._ranks.several and self.log_dir is not None:
+            curves = self.writer if isinstance(self.writer, CurveWriter) else None
+            self.writer = MeanCurves(self._ranks, curves)
 
     def log(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401
         """Log an iteration, see `Logger.log`; show it on the display instead of the console."""
@@ -116,7 +159,7 @@ class TrainingLogger(Logger):
         # rsl_rl's runner names every argument.
         iteration, total = kwargs["it"], kwargs["total_it"]
         scalars: dict[str, float] = {}
-        if isinstance(self.writer, CurveWriter):
+        if isinstance(self.writer, CurveWriter | MeanCurves):
             for tag, value in self._measure(iteration).items():
                 self.writer.add_scalar(tag, value, iteration)
             scalars = self.writer.end_iteration(iteration)
@@ -139,6 +182,10 @@ class TrainingLogger(Logger):
         self.lenbuffer.extend(state["lengths"])
         self.cur_reward_sum = state["reward_sum"].to(self.device)
         self.cur_episode_length = state["episode_length"].to(self.device)
+        self.load_totals(state)
+
+    def load_totals(self, state: dict[str, Any]) -> None:
+        """Continue the counts of a `state_dict` alone."""
         self.tot_timesteps, self.tot_time = state["total_steps"], state["total_time"]
 
 

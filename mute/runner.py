@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import io
 import signal
 from collections.abc import Callable, Iterator
@@ -14,19 +15,20 @@ import torch
 from rsl_rl.runners import OnPolicyRunner
 
 from envs.observations import OBS_DIM
-from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
 from mute.algorithm import EstimatorPPO
 from mute.checkpoint import CheckpointError, first_line, load_checkpoint, save_checkpoint
 from mute.config import TaskCfg, to_plain
 from mute.controllers.learned import make_policy
+from mute.distributed import Ranks
 from mute.estimated_env import EstimatedEnv
 from mute.estimation import EstimatorTrainer
 from mute.evaluation.noise_probe import NoiseProbe
 from mute.logger import TrainingLogger
-from mute.threads import use_collection_threads
+from mute.threads import core_share, use_collection_threads
 from networks.estimator import Estimator
 
-__all__ = ["MuteRunner", "policy_part"]
+__all__ = ["MuteRunner", "Progress", "policy_part"]
 
 Progress = Callable[[int, int, dict[str, float]], None]
 
@@ -39,7 +41,11 @@ def policy_part(checkpoint: dict[str, Any]) -> dict[str, Any]:
 
 
 class MuteRunner(OnPolicyRunner):
-    """Learns a task: environment, estimator and PPO in rsl_rl's loop; saves and resumes."""
+    """Learns a task: environment, estimator and PPO in rsl_rl's loop; saves and resumes.
+
+    With several ranks, each has the configured number of robots. `train` and `save` are then to be
+    called on all of them; nothing else waits for the others.
+    """
 
     alg: EstimatorPPO  # pyright: ignore[reportIncompatibleVariableOverride]
     env: EstimatedEnv  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -51,6 +57,7 @@ class MuteRunner(OnPolicyRunner):
         log_dir: Path | None,
         device: str = "cpu",
         on_iteration: Progress | None = None,
+        ranks: Ranks | None = None,
     ) -> None:
         """Build everything.
 
@@ -60,10 +67,12 @@ class MuteRunner(OnPolicyRunner):
             log_dir: Directory of the run; None keeps nothing.
             device: Device of the networks and, unless `env.engine` forbids it, of the physics.
             on_iteration: Called with (iteration, total, scalars) after each iteration.
+            ranks: Processes that learn together, which all are given the same configuration.
         """
-        torch.manual_seed(cfg.env.seed)
+        self.ranks = ranks or Ranks()
+        torch.manual_seed(self.ranks.seed(cfg.env.seed))
         self.task, self.task_cfg = task, cfg
-        env = QuadrupedEnv(cfg.env, device)
+        env = QuadrupedEnv(_own_share(cfg.env, self.ranks), device)
         estimation = cfg.agent.estimation
         estimator = Estimator(OBS_DIM, env.grid.shape[0], estimation.network).to(device)
         estimated = EstimatedEnv(env, estimator, device, estimation.actor_uses_phase)
@@ -75,21 +84,21 @@ class MuteRunner(OnPolicyRunner):
         trainer = EstimatorTrainer(
             estimator, estimation, env.privileged_slices, feet.min_steps, feet.max_steps
         )
-        self.alg.attach(estimated, trainer)
+        self.alg.attach(estimated, trainer, self.ranks)
         self.logger = TrainingLogger(
             log_dir=str(log_dir) if log_dir else None,
             cfg=self.cfg,
             env_cfg=cfg.env,
             num_envs=estimated.num_envs,
-            is_distributed=self.is_distributed,
-            gpu_world_size=self.gpu_world_size,
-            gpu_global_rank=self.gpu_global_rank,
             device=device,
             measure=self._measure_noise,
             on_iteration=self._end_iteration,
+            ranks=self.ranks,
         )
         self._noise_probe = NoiseProbe()
         self._levels: dict[str, float] = {}
+        self.robots_anew = True
+        """Whether robots begin their first episodes, as they do unless `load` finds them saved."""
         self._on_iteration = on_iteration
         self._stop_requested = False
 
@@ -98,10 +107,11 @@ class MuteRunner(OnPolicyRunner):
 
         Ctrl-C ends the current iteration, saves and returns; a second one ends at once.
         """
-        done = self.current_learning_iteration
+        left = self.task_cfg.agent.iterations - self.current_learning_iteration
         with self._catch_interrupt():
             try:
-                self.learn(self.task_cfg.agent.iterations - done, init_at_random_ep_len=done == 0)
+                self._agree()
+                self.learn(left, init_at_random_ep_len=self.robots_anew)
             except _StopTraining:
                 if self.logger.log_dir is not None:
                     self.save(str(self.checkpoint_path()))
@@ -120,21 +130,16 @@ class MuteRunner(OnPolicyRunner):
         return Path(self.logger.log_dir) / f"model_{self.current_learning_iteration}.pt"
 
     def save(self, path: str, infos: dict | None = None) -> None:
-        """Save all that is needed to continue bit for bit, atomically."""
-        about = self._about(self.current_learning_iteration)
-        payload = (
-            self.alg.save()
-            | about
-            | {
-                "env": self.env.state_dict(),
-                "logger": self.logger.state_dict(),
-                "torch_random_state": torch.get_rng_state(),
-                "cuda_random_state": torch.cuda.get_rng_state(self.device)
-                if self._on_cuda
-                else None,
-                "infos": infos,
-            }
-        )
+        """Save all that is needed to continue bit for bit, atomically; the first rank writes."""
+        own = self._own_state()
+        payload = self.alg.save() | own
+        if self.ranks.several:
+            own["estimator_past"] = payload["estimator_trainer"]["past"]
+            gathered = self.ranks.gather_states({} if self.ranks.first else own)
+            payload["other_ranks"] = gathered[1:]
+        if not self.ranks.first:
+            return
+        payload |= self._about(self.current_learning_iteration) | {"infos": infos}
         save_checkpoint(Path(path), payload)
         self.logger.save_model(path, self.current_learning_iteration)
 
@@ -147,6 +152,9 @@ class MuteRunner(OnPolicyRunner):
     ) -> dict:
         """Continue from a checkpoint.
 
+        One of another number of ranks has no state for each of these: what is learnt, the
+        iterations and the curricula then go on, and the robots begin anew.
+
         Raises:
             CheckpointError: If it is damaged, foreign, or of another configuration.
         """
@@ -154,16 +162,18 @@ class MuteRunner(OnPolicyRunner):
         # to where they are, and the random states stay where they belong.
         checkpoint = load_checkpoint(Path(path), map_location or "cpu")
         try:
+            own = _part_of_rank(checkpoint, self.ranks)
+            checkpoint["estimator_trainer"]["past"] = {} if own is None else own["estimator_past"]
             self.alg.load(checkpoint, load_cfg, strict)
-            self.env.load_state_dict(checkpoint["env"])
-            self.logger.load_state_dict(checkpoint["logger"])
-            torch.set_rng_state(checkpoint["torch_random_state"])
-            # A run that moves to a GPU has no state to go on from there.
-            if self._on_cuda and checkpoint["cuda_random_state"] is not None:
-                torch.cuda.set_rng_state(checkpoint["cuda_random_state"], self.device)
+            if own is None:
+                self.env.restart(checkpoint["env"]["env"]["step_count"])
+                self.logger.load_totals(checkpoint["logger"])
+            else:
+                self._load_own_state(own)
         except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
             reason = first_line(error)
             raise CheckpointError(f"{path} does not fit this configuration: {reason}") from error
+        self.robots_anew = own is None
         # The saved iteration is finished.
         self.current_learning_iteration = checkpoint["iter"] + 1
         # What was logged after the checkpoint is learnt, and logged, again.
@@ -175,9 +185,12 @@ class MuteRunner(OnPolicyRunner):
         return torch.device(self.device).type == "cuda"
 
     def _measure_noise(self, iteration: int) -> dict[str, float]:
-        """Return the modelled noise levels where the iteration is one that measures them, dBA."""
+        """Return the modelled noise levels where the iteration is one that measures them, dBA.
+
+        They are the same for all ranks, so the first one measures and the others wait.
+        """
         interval = self.task_cfg.agent.noise_interval
-        if not interval or (iteration + 1) % interval:
+        if not self.ranks.first or not interval or (iteration + 1) % interval:
             return {}
         with torch.random.fork_rng(devices=[]):  # networks are born with random weights
             policy = make_policy(policy_part(self.alg.save() | self._about(iteration)))
@@ -193,15 +206,55 @@ class MuteRunner(OnPolicyRunner):
         if self._on_iteration is not None:
             # Between two trials the display goes on showing the last one's levels.
             self._on_iteration(iteration, total, self._levels | scalars)
-        if self._stop_requested and iteration + 1 < total:
+        # A signal may reach one rank alone, or another one an iteration later.
+        if self.ranks.any(self._stop_requested) and iteration + 1 < total:
             raise _StopTraining
+
+    def _configure_multi_gpu(self) -> None:
+        """Tell rsl_rl of the ranks; its own way insists on CUDA, and makes the process group."""
+        ranks = self.ranks
+        self.gpu_world_size, self.gpu_global_rank = ranks.world_size, ranks.rank
+        self.gpu_local_rank = ranks.local_rank
+        # Told otherwise, `learn` would do what `_agree` does, with a line on every rank's console.
+        self.is_distributed = False
+        sizes = {"global_rank": ranks.rank, "local_rank": ranks.local_rank}
+        self.cfg["multi_gpu"] = sizes | {"world_size": ranks.world_size} if ranks.several else None
+
+    def _agree(self) -> None:
+        """Give all ranks the first one's networks, and estimate anew with them."""
+        if self.ranks.several:
+            self.alg.broadcast_parameters()
+            self.env.refresh()
+
+    def _own_state(self) -> dict[str, Any]:
+        """Return what differs between ranks."""
+        return {
+            "env": self.env.state_dict(),
+            "logger": self.logger.state_dict(),
+            "torch_random_state": torch.get_rng_state(),
+            "cuda_random_state": torch.cuda.get_rng_state(self.device) if self._on_cuda else None,
+        }
+
+    def _load_own_state(self, state: dict[str, Any]) -> None:
+        self.env.load_state_dict(state["env"])
+        self.logger.load_state_dict(state["logger"])
+        torch.set_rng_state(state["torch_random_state"])
+        # A run that moves to a GPU has no state to go on from there.
+        if self._on_cuda and state["cuda_random_state"] is not None:
+            torch.cuda.set_rng_state(state["cuda_random_state"], self.device)
 
     @contextlib.contextmanager
     def _catch_interrupt(self) -> Iterator[None]:
-        """Turn the first SIGINT or SIGTERM into a request heeded at the end of the iteration."""
+        """Turn the first SIGINT or SIGTERM into a request heeded at the end of the iteration.
+
+        With several ranks a second one says no more: torchrun passes on what a rank may have had
+        already, and ends by force what does not end by itself. It also signals the ranks that are
+        left when one is gone, which shall not keep them from saying so: there, requests are taken
+        to the end of the process.
+        """
 
         def request(signum: int, frame: FrameType | None) -> None:
-            if self._stop_requested:
+            if self._stop_requested and not self.ranks.several:
                 raise KeyboardInterrupt
             self._stop_requested = True
 
@@ -210,8 +263,24 @@ class MuteRunner(OnPolicyRunner):
         try:
             yield
         finally:
-            for number, handler in previous.items():
-                signal.signal(number, handler)
+            if not self.ranks.several:
+                for number, handler in previous.items():
+                    signal.signal(number, handler)
+
+
+def _own_share(cfg: QuadrupedEnvCfg, ranks: Ranks) -> QuadrupedEnvCfg:
+    """Return a rank's world: its own draws, and its share of the cores where none are given."""
+    if not ranks.several:
+        return cfg
+    threads = cfg.num_threads or core_share()
+    return dataclasses.replace(cfg, seed=ranks.seed(cfg.seed), num_threads=threads)
+
+
+def _part_of_rank(checkpoint: dict[str, Any], ranks: Ranks) -> dict[str, Any] | None:
+    """Return what a rank saved of its own; None if those who saved were more or fewer."""
+    first = checkpoint | {"estimator_past": checkpoint["estimator_trainer"]["past"]}
+    parts = [first, *checkpoint.get("other_ranks", [])]
+    return parts[ranks.rank] if len(parts) == ranks.world_size else None
 
 
 class _StopTraining(Exception):  # noqa: N818

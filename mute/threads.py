@@ -5,7 +5,7 @@ which runs torch. They work in turns. By default a worker of OpenMP that has not
 core busy for a while in case more work follows, and so takes it from MuJoCo's pool just when that
 one runs. Waiting passively gives the core back: on 2 cores, PPO-sized batches went through a small
 network 3 times as fast. How many threads a pool has is left to the pools; `OMP_NUM_THREADS` limits
-torch's as everywhere.
+torch's as everywhere. Processes that torchrun starts on one machine share its cores.
 """
 
 from __future__ import annotations
@@ -53,7 +53,19 @@ def use_learning_threads() -> None:
 @functools.cache
 def _learning_threads() -> int:
     limit = os.environ.get("OMP_NUM_THREADS", "")
-    return int(limit) if limit.isdigit() and int(limit) > 0 else usable_cores()
+    # torchrun sets 1 for several processes where the user has set nothing.
+    unset = limit == "1" and _local_world_size() > 1
+    return int(limit) if limit.isdigit() and int(limit) > 0 and not unset else core_share()
+
+
+def core_share() -> int:
+    """Return the number of processors for this process, of all that torchrun started here."""
+    return max(1, usable_cores() // _local_world_size())
+
+
+def _local_world_size() -> int:
+    size = os.environ.get("LOCAL_WORLD_SIZE", "")
+    return int(size) if size.isdigit() and int(size) > 0 else 1
 
 
 def usable_cores() -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 import shlex
 import sys
 import time
@@ -17,14 +16,20 @@ import yaml
 
 from envs.quadruped_env import QuadrupedEnvCfg
 from envs.scene import SceneError
-from mute.checkpoint import CheckpointError, latest_checkpoint, load_checkpoint
+from mute.checkpoint import (
+    CheckpointError,
+    latest_checkpoint,
+    load_checkpoint,
+    newest_checkpoint,
+)
 from mute.command_lines.arguments import command_line, parse, resolve_device, selected_task
 from mute.config import AgentCfg, TaskCfg, from_plain, to_plain
-from mute.errors import MuteError
+from mute.distributed import Ranks, joined_ranks
+from mute.errors import EXIT_INTERRUPTED, MuteError
 from mute.files import replace_file
 from mute.logger import LiveDisplay, PlainDisplay
 from mute.provenance import current_commit, machine_kind
-from mute.runner import MuteRunner
+from mute.runner import MuteRunner, Progress
 from mute.tasks import DEFAULT_TASK, make_task
 
 __all__ = ["main"]
@@ -41,13 +46,15 @@ class TrainArgs:
     task: str = DEFAULT_TASK
     """Task to learn."""
     num_envs: int | None = None
-    """Number of robots; by default what suits the machine."""
+    """Number of robots, of each rank where torchrun starts several; by default what suits the
+    machine."""
     iterations: int | None = None
     """Rollouts and updates in all, those before a --resume included."""
     seed: int | None = None
     """Seed of everything random."""
     device: str = "auto"
-    """auto, cpu or cuda: where networks and physics live."""
+    """auto, cpu or cuda: where networks and physics live; with torchrun, each rank has a GPU of its
+    own."""
     run_name: str = ""
     """Name of the run; by default the date and time."""
     log_dir: Path = Path("runs")
@@ -66,40 +73,85 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status.
 
     Raises:
-        MuteError: If an argument is bad or a checkpoint cannot be used.
+        MuteError: If an argument is bad, a checkpoint cannot be used, or a rank is gone.
     """
     argv = command_line() if argv is None else list(argv)
-    args, checkpoint = _arguments(argv)
-    cfg = _configuration(args)
-    device = resolve_device(args.device)
-    torch.set_float32_matmul_precision(cfg.agent.matmul_precision)
-    run_dir = checkpoint.parent if checkpoint else _new_run(args)
-    display = PlainDisplay() if args.plain else LiveDisplay(args.task)
-    if cfg.env.engine == "warp" or (cfg.env.engine == "auto" and device == "cuda"):
-        print("Warp compiles its kernels at their first use, for a minute or more", file=sys.stderr)
-    try:
-        runner = MuteRunner(args.task, cfg, run_dir, device, display.update)
-    except (ValueError, SceneError) as error:
-        raise MuteError(str(error)) from error
-    if checkpoint:
-        runner.load(str(checkpoint))
-        if runner.current_learning_iteration >= cfg.agent.iterations:
-            raise MuteError(
-                f"{checkpoint} has finished its {cfg.agent.iterations} iterations; "
-                "ask for more with --iterations"
-            )
-    _make_directory(run_dir)
-    _write_parameters(run_dir, args, cfg, argv)
-    print(f"run: {run_dir}", file=sys.stderr)
-    with display:
+    with joined_ranks() as ranks:
+        return _learn(argv, ranks)
+
+
+def _learn(argv: Sequence[str], ranks: Ranks) -> int:
+    start = ranks.broadcast(time.strftime("%Y-%m-%d_%H-%M-%S"))
+    with ranks.together():
+        args, checkpoint = _arguments(argv)
+        cfg = _configuration(args)
+        kind = resolve_device(args.device)
+        torch.set_float32_matmul_precision(cfg.agent.matmul_precision)
+        run_dir = checkpoint.parent if checkpoint else _new_run(args, start)
+        display = PlainDisplay() if args.plain or not ranks.first else LiveDisplay(args.task)
+        if cfg.env.engine == "warp" or (cfg.env.engine == "auto" and kind == "cuda"):
+            _say(ranks, "Warp compiles its kernels at their first use, for a minute or more")
+        runner = _make_runner(args, cfg, run_dir, ranks, kind, display.update)
+        if checkpoint:
+            _resume(runner, checkpoint)
+    same = (to_plain(cfg), kind, str(run_dir), runner.current_learning_iteration)
+    ranks.check_equal("configuration or checkpoint", same)
+    with ranks.together():
+        if ranks.first:
+            _make_directory(run_dir)
+            _write_parameters(run_dir, args, cfg, [*ranks.launcher.split(), "train.py", *argv])
+    if checkpoint and runner.robots_anew:
+        _say(
+            ranks,
+            f"{checkpoint} is of another number of ranks: networks, optimisers, normalisers and "
+            "curricula go on, robots begin anew",
+        )
+    _say(ranks, f"run: {run_dir}")
+    goes_on = f"{ranks.launcher} train.py --task {args.task} --resume"
+    with display, ranks.watched(lambda: _last_saved(run_dir, goes_on)):
         finished = runner.train()
     path = runner.checkpoint_path()
-    verb = "saved" if finished else "interrupted, saved"
-    print(f"{verb}: {path}", file=sys.stderr)
+    _say(ranks, f"{'saved' if finished else 'interrupted, saved'}: {path}")
     if not finished:
-        print(f"go on with: python train.py --task {args.task} --resume {path}", file=sys.stderr)
-        return 130
+        _say(ranks, f"go on with: {goes_on} {path}")
+        return EXIT_INTERRUPTED
     return 0
+
+
+def _say(ranks: Ranks, line: str) -> None:
+    if ranks.first:
+        print(line, file=sys.stderr)
+
+
+def _last_saved(run_dir: Path, goes_on: str) -> str:
+    newest = newest_checkpoint(run_dir)
+    if newest is None:
+        return "no checkpoint has been saved yet"
+    return f"the last checkpoint is whole, go on with: {goes_on} {newest}"
+
+
+def _make_runner(
+    args: TrainArgs,
+    cfg: TaskCfg,
+    run_dir: Path,
+    ranks: Ranks,
+    kind: str,
+    on_iteration: Progress,
+) -> MuteRunner:
+    shown = on_iteration if ranks.first else None
+    try:
+        return MuteRunner(args.task, cfg, run_dir, ranks.device(kind), shown, ranks)
+    except (ValueError, SceneError) as error:
+        raise MuteError(str(error)) from error
+
+
+def _resume(runner: MuteRunner, checkpoint: Path) -> None:
+    runner.load(str(checkpoint))
+    iterations = runner.task_cfg.agent.iterations
+    if runner.current_learning_iteration >= iterations:
+        raise MuteError(
+            f"{checkpoint} has finished its {iterations} iterations; ask for more with --iterations"
+        )
 
 
 def _arguments(argv: Sequence[str]) -> tuple[TrainArgs, Path | None]:
@@ -138,12 +190,11 @@ def _check_resume(args: TrainArgs, path: Path, seed: int, iteration: int) -> Non
         raise MuteError(
             f"--run-name {args.run_name}: a resumed run keeps its name; leave --run-name away"
         )
-    matches = (re.fullmatch(r"model_(\d+)\.pt", file.name) for file in path.parent.iterdir())
-    newest = max((int(match[1]) for match in matches if match), default=iteration)
-    if newest > iteration:
+    newest = newest_checkpoint(path.parent)
+    if newest is not None and int(newest.stem.removeprefix("model_")) > iteration:
         raise MuteError(
-            f"{path} is not the newest checkpoint of its run: resume "
-            f"{path.with_name(f'model_{newest}.pt')}, or delete or move away the later ones"
+            f"{path} is not the newest checkpoint of its run: resume {newest}, or delete or move "
+            "away the later ones"
         )
 
 
@@ -169,9 +220,9 @@ def _configuration(args: TrainArgs) -> TaskCfg:
         raise MuteError(str(error)) from error
 
 
-def _new_run(args: TrainArgs) -> Path:
+def _new_run(args: TrainArgs, start: str) -> Path:
     """Return the directory of a new run, which is made once everything else has gone well."""
-    name = args.run_name or time.strftime("%Y-%m-%d_%H-%M-%S")
+    name = args.run_name or start
     if Path(name).name != name or name == "..":
         raise MuteError(f"--run-name must be a plain name without '/', got {name!r}")
     run_dir = args.log_dir / args.task / name
@@ -190,14 +241,14 @@ def _make_directory(run_dir: Path) -> None:
         raise MuteError(f"--log-dir: cannot make {run_dir}: {error.strerror}") from error
 
 
-def _write_parameters(run_dir: Path, args: TrainArgs, cfg: TaskCfg, argv: Sequence[str]) -> None:
+def _write_parameters(run_dir: Path, args: TrainArgs, cfg: TaskCfg, command: Sequence[str]) -> None:
     """Write what the run is re-made from, before it starts or goes on.
 
     The command that started it stays; those that went on are listed under `resumed`.
     """
     path = run_dir / _PARAMETERS
     origin: dict[str, Any] = {
-        "command": shlex.join(["python", "train.py", *argv]),
+        "command": shlex.join(command),
         "commit": current_commit(),
         "machine": machine_kind(),
     }

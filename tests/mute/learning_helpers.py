@@ -75,6 +75,22 @@ def clone_tree(value: Any) -> Any:
     return value
 
 
+def everything(runner: MuteRunner) -> dict[str, Any]:
+    """Return all that a run goes on from."""
+    return clone_tree(
+        {
+            "learner": runner.alg.save(),
+            "learning_rate": runner.alg.learning_rate,
+            "world": runner.env.state_dict(),
+            "observations": dict(runner.env.get_observations().items()),
+            "lstm": runner.env.state,
+            "averages": runner.logger.state_dict() | {"total_time": 0.0},
+            "random": torch.get_rng_state(),
+            "iteration": runner.current_learning_iteration,
+        }
+    )
+
+
 def differences(one: Any, other: Any, place: str = "") -> list[str]:
     """Return the places where two trees are not bit-equal; NaN equals itself."""
     if isinstance(one, dict) and isinstance(other, dict):

@@ -166,9 +166,9 @@ def _labels_after(monkeypatch, rollouts: int, ends: Iterable[tuple[int, int]] = 
     seen: list[Labels] = []
     losses = estimation.estimator_losses
 
-    def spy(estimate, decoded, labels, cfg):
+    def spy(estimate, decoded, labels, cfg, ranks):
         seen.append(labels)
-        return losses(estimate, decoded, labels, cfg)
+        return losses(estimate, decoded, labels, cfg, ranks)
 
     monkeypatch.setattr(estimation, "estimator_losses", spy)
     trainer = _make_trainer()

@@ -8,28 +8,13 @@ import time
 
 import pytest
 import torch
-from learning_helpers import clone_tree, differences, make_cfg, make_runner
+from learning_helpers import differences, everything, make_cfg, make_runner
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from mute.checkpoint import CheckpointError, load_checkpoint
 from mute.logger import CurveWriter
 from mute.runner import MuteRunner, policy_part
 from mute.tasks import make_task
-
-
-def _everything(runner: MuteRunner) -> dict:
-    return clone_tree(
-        {
-            "learner": runner.alg.save(),
-            "learning_rate": runner.alg.learning_rate,
-            "world": runner.env.state_dict(),
-            "observations": dict(runner.env.get_observations().items()),
-            "lstm": runner.env.state,
-            "averages": runner.logger.state_dict() | {"total_time": 0.0},
-            "random": torch.get_rng_state(),
-            "iteration": runner.current_learning_iteration,
-        }
-    )
 
 
 def _curves(directory) -> list[dict[str, float]]:
@@ -44,7 +29,7 @@ def whole_run(tmp_path_factory):
     directory = tmp_path_factory.mktemp("whole")
     runner = make_runner(directory, iterations=4)
     assert runner.train()
-    return directory, _everything(runner)
+    return directory, everything(runner)
 
 
 def test_episodes_end_inside_these_rollouts(whole_run):
@@ -60,7 +45,7 @@ def test_a_resumed_run_equals_an_uninterrupted_one_bit_for_bit(whole_run, tmp_pa
     runner.load(str(directory / "model_1.pt"))
     assert runner.current_learning_iteration == 2
     assert runner.train()
-    assert differences(_everything(runner), expected) == []
+    assert differences(everything(runner), expected) == []
     assert _curves(tmp_path) == _curves(directory)[2:]
 
 
@@ -78,7 +63,7 @@ def test_a_forgotten_curriculum_would_change_what_a_resumed_run_learns(whole_run
     runner.load(str(directory / "model_1.pt"))
     runner.env.env.step_count = 0
     runner.train()
-    changed = differences(_everything(runner), expected)
+    changed = differences(everything(runner), expected)
     assert any(place.startswith("/learner/actor_state_dict") for place in changed)
     assert any(place.startswith("/world/env/command") for place in changed)
 
@@ -109,7 +94,7 @@ def test_on_two_threads_with_quick_products_a_resumed_run_is_bit_equal_too(tmp_p
         torch.set_float32_matmul_precision(precision)
         torch.set_num_threads(threads)
     assert set(used) == {2}
-    assert differences(_everything(resumed), _everything(whole)) == []
+    assert differences(everything(resumed), everything(whole)) == []
     assert _curves(tmp_path / "resumed") == _curves(tmp_path / "whole")[1:]
 
 
@@ -126,7 +111,7 @@ def test_loading_restores_everything_without_a_step(whole_run):
     runner = make_runner(iterations=9)
     runner.load(str(directory / "model_3.pt"))
     expected = expected | {"iteration": 4}
-    assert differences(_everything(runner), expected) == []
+    assert differences(everything(runner), expected) == []
 
 
 def test_a_checkpoint_holds_the_configuration_and_the_small_part_plays_alone(whole_run):
@@ -170,7 +155,7 @@ def test_ctrl_c_ends_the_iteration_saves_it_and_the_rest_gives_the_same_result(w
     other = make_runner(tmp_path, iterations=4)
     other.load(str(runner.checkpoint_path()))
     assert other.train()
-    assert differences(_everything(other), expected) == []
+    assert differences(everything(other), expected) == []
     assert [line["iteration"] for line in _curves(tmp_path)] == [0, 1, 2, 3]
 
 
@@ -244,7 +229,7 @@ def test_noise_is_measured_at_its_interval_and_changes_nothing_else(tmp_path):
         cfg.agent.noise_interval = interval
         runner = MuteRunner("go1_mute", cfg, tmp_path / name)
         assert runner.train()
-        ends.append(_everything(runner))
+        ends.append(everything(runner))
         levels.append([line.get("Noise/level_beta_1") for line in _curves(tmp_path / name)])
     assert differences(*ends) == []
     assert levels[0] == [None] * 4
@@ -293,9 +278,9 @@ def test_the_estimator_learns_the_velocity_of_a_moving_robot():
     shares = []
     update = runner.alg.trainer.update
 
-    def spy(storage, initial_state, world_size=1):
+    def spy(storage, initial_state, ranks=None):
         past = runner.alg.trainer.state_dict()["past"]
-        losses = update(storage, initial_state, world_size)
+        losses = update(storage, initial_state, ranks)
         if losses:
             velocity = past["base_lin_vel"]
             spread = (velocity - velocity.mean(dim=(0, 1))).square().mean().sqrt()

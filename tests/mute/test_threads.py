@@ -8,6 +8,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from mute import threads
+
 REPO = Path(__file__).resolve().parents[2]
 NAMES = ("OMP_WAIT_POLICY", "GOMP_SPINCOUNT", "OMP_NUM_THREADS")
 
@@ -53,3 +57,27 @@ def test_a_users_spin_count_is_kept_and_not_undone_by_a_policy():
 def test_the_number_of_threads_stays_the_users():
     assert _configure()[0]["OMP_NUM_THREADS"] is None
     assert _configure(OMP_NUM_THREADS="3")[0]["OMP_NUM_THREADS"] == "3"
+
+
+@pytest.mark.parametrize(
+    ("processes", "limit", "expected"),
+    [
+        ("", "", 16),
+        ("", "1", 1),
+        ("8", "", 2),
+        ("8", "1", 2),  # torchrun's own setting
+        ("8", "3", 3),
+        ("32", "1", 1),
+    ],
+)
+def test_the_processes_that_torchrun_starts_on_a_machine_share_its_cores(
+    processes, limit, expected, monkeypatch
+):
+    monkeypatch.setattr(threads, "usable_cores", lambda: 16)
+    monkeypatch.setenv("LOCAL_WORLD_SIZE", processes)
+    monkeypatch.setenv("OMP_NUM_THREADS", limit)
+    threads._learning_threads.cache_clear()
+    try:
+        assert threads._learning_threads() == expected
+    finally:
+        threads._learning_threads.cache_clear()
