@@ -30,7 +30,7 @@ _AT_SPEED = {
     "apex_mean": ("apex (cm)", "{:.1f}"),
     "duty_factor": ("duty factor", "{:.2f}"),
     "stride_frequency": ("strides/s a foot", "{:.2f}"),
-    "power": ("power (W)", "{:.1f}"),
+    "power": ("power, control steps (W)", "{:.1f}"),
 }
 _NOISE = {
     "surface": ("floor", "{}"),
