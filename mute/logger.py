@@ -11,6 +11,7 @@ import io
 import json
 import statistics
 import time
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -140,6 +141,9 @@ class TrainingLogger(Logger):
             gpu_global_rank=ranks.rank,
             **kwargs,
         )
+        # rsl_rl averages the last 100 episodes, which are those of all ranks together here as well.
+        kept = max(1, 100 // ranks.world_size)
+        self.rewbuffer, self.lenbuffer = deque(maxlen=kept), deque(maxlen=kept)
         self._measure = measure
         self._on_iteration = on_iteration
         self._ranks = ranks
