@@ -112,7 +112,7 @@ class Ranks:
 
     def any(self, flag: bool) -> bool:
         """Return whether a flag is set on any rank."""
-        return bool(self.mean(torch.tensor(float(flag))) > 0.0)
+        return bool(self.mean(torch.tensor(float(flag), device="cpu")) > 0.0)
 
     def average_gradients(self, parameters: Iterable[torch.nn.Parameter]) -> None:
         """Give every rank the mean of the gradients."""
