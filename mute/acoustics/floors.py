@@ -161,7 +161,7 @@ FLOORS: dict[str, Floor] = {
         Floor(
             name="concrete",  # a bare trowelled slab
             friction=0.75,  # middle of the 0.7 to 0.8 above
-            solref=(0.008, 1.0),  # chosen: the hardest; above twice a step of 4 ms
+            solref=(0.008, 1.0),  # chosen: the hardest
             stiffness=1e8,  # chosen: rigid beside the foot
             restitution=0.45,  # chosen
             # Chosen: bright too, but a thick slab has its modes elsewhere and loses more into what

@@ -1,7 +1,7 @@
 """From physics to sound: what an environment's robots do, read at every physics step.
 
-Nothing is sampled at the control rate: a landing peak lasts 15 to 25 ms. The recorder only copies
-while the physics runs; a block is worked out when it is taken.
+Nothing is sampled at the control rate: an impact is over within a control step. The recorder only
+copies while the physics runs; a block is worked out when it is taken.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ from mute.acoustics.contacts import ContactBlock, Impacts
 __all__ = ["Recorder", "effective_mass"]
 
 _RELEASE = 0.005
-"""Time without contact after which the next contact is an impact, s. The solver may drop a contact
-that carries little load for a step or two; a foot that is off the ground that shortly cannot have
-gathered speed."""
+"""Time without contact after which the next contact is an impact, s (chosen). The solver may drop a
+contact that carries little load for a step or two; a foot that is off the ground that shortly
+cannot have gathered speed."""
 
 _CREEP = 0.02
-"""Sliding speed up to which a foot counts as sticking, m/s. MuJoCo's friction is soft: a foot that
-carries load creeps, where a real one stands."""
+"""Sliding speed up to which a foot counts as sticking, m/s (chosen). MuJoCo's friction is soft: a
+foot that carries load creeps, where a real one stands. From 1 to 5 cm/s scuffing changes by 3 dB on
+wood, and the mean level of a walk by less than 0.3 dB."""
 
 FloorAt = Callable[[NDArray[np.floating]], NDArray[np.integer]]
 
