@@ -2,6 +2,7 @@
 
 Every part is timed in one process and in turns with the bare engine, so that a machine whose speed
 drifts does not favour one of them. Each size runs in a process of its own, for its memory.
+`--peers` times other ways to step a Go1 after that, see `mute.peers`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import torch
 from mjbatch import Batch
@@ -27,9 +29,10 @@ from rsl_rl.algorithms import PPO
 from rsl_rl.utils import check_nan
 
 from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
-from mute.command_lines.arguments import command_line, parse
+from mute.command_lines.arguments import Words, command_line, parse
 from mute.errors import MuteError, run_cli
 from mute.evaluation.tables import print_table, write_json
+from mute.peers import peer_names, time_peer
 from mute.processes import call_apart, peak_memory_mb
 from mute.provenance import machine_kind
 from mute.runner import MuteRunner
@@ -44,10 +47,18 @@ class BenchmarkArgs:
 
     task: str = DEFAULT_TASK
     """Task to measure."""
-    num_envs: tuple[int, ...] = (256, 1024, 4096, 8192)
+    num_envs: tuple[int, ...] = (256, 1024, 4096, 8192, 16384)
     """Numbers of environments."""
     rollouts: int = 5
     """Rollouts that each part is timed over; the median counts."""
+    peers: Words = ()
+    """Other simulations of a Go1 to time on the CPU as well: all, or some of gymnasium, mjlab and
+    mujoco_playground; none if not given. The last two step as many robots as the smallest of
+    --num-envs, after minutes of compiling. One that is not installed is told as such."""
+    mjlab_python: Path | None = None
+    """Python interpreter of the virtual environment that has mjlab; this one if not given."""
+    playground_python: Path | None = None
+    """Python interpreter that has MuJoCo Playground (package playground), likewise."""
     json: bool = False
     """Print JSON and nothing else."""
     out: Path | None = None
@@ -70,6 +81,12 @@ class Rates:
     """The update: estimator and PPO."""
     loop: float
     """Collection and learning together."""
+    environment_over_engine: float
+    """The environment as a share of the engine alone."""
+    collection_over_engine: float
+    """Collection as a share of the engine alone."""
+    learning_over_engine: float
+    """Learning as a share of the engine alone."""
     loop_over_engine: float
     """The whole loop as a share of the engine alone."""
     peak_memory_mb: float
@@ -106,14 +123,13 @@ def measure(task: str, num_envs: int, rollouts: int) -> Rates:
                 times[name].append(time.perf_counter() - start)
     seconds = {name: statistics.median(values) for name, values in times.items()}
     rates = {name: num_envs * steps / value for name, value in seconds.items()}
-    loop = num_envs * steps / (seconds["collection"] + seconds["learning"])
-    return Rates(
-        num_envs=num_envs,
-        **rates,
-        loop=loop,
-        loop_over_engine=loop / rates["engine"],
-        peak_memory_mb=peak_memory_mb(),
-    )
+    rates["loop"] = num_envs * steps / (seconds["collection"] + seconds["learning"])
+    over_engine = {
+        f"{name}_over_engine": rate / rates["engine"]
+        for name, rate in rates.items()
+        if name != "engine"
+    }
+    return Rates(num_envs=num_envs, **rates, **over_engine, peak_memory_mb=peak_memory_mb())
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -125,20 +141,32 @@ def main(argv: Sequence[str] | None = None) -> int:
     argv = command_line() if argv is None else list(argv)
     args = parse(BenchmarkArgs, argv, "Measure the speed of training, part by part.")
     make_task(args.task)
+    peers = peer_names(args.peers)
     if not args.num_envs or min(args.num_envs) < 1:
         raise MuteError(f"--num-envs must be numbers >= 1, got {args.num_envs}")
     if args.rollouts < 1:
         raise MuteError(f"--rollouts must be >= 1, got {args.rollouts}")
     sizes = args.num_envs if args.json else track(args.num_envs, "environments")
     rows = [_in_process(args.task, num_envs, args.rollouts) for num_envs in sizes]
-    content = {"task": args.task, "machine": machine_kind(), "rates": rows}
+    peer_rows = _peer_rows(args, peers)
+    content = {"task": args.task, "machine": machine_kind(), "rates": rows, "peers": peer_rows}
     if args.out is not None:
         write_json(args.out, content)
     if args.json:
         print(json.dumps(content))
     else:
         print_table(f"control steps/s, {content['machine']}", rows, list(rows[0]))
+        if peer_rows:
+            shown = [{k: "-" if v is None else v for k, v in row.items()} for row in peer_rows]
+            print_table("peers, control steps/s", shown, list(shown[0]))
     return 0
+
+
+def _peer_rows(args: BenchmarkArgs, peers: Sequence[str]) -> list[dict[str, Any]]:
+    pythons = {"mjlab": args.mjlab_python, "mujoco_playground": args.playground_python}
+    shape = (min(args.num_envs), args.rollouts, args.task)
+    names = peers if args.json or not peers else track(peers, "peers")
+    return [dataclasses.asdict(time_peer(name, pythons.get(name), *shape)) for name in names]
 
 
 def _in_process(task: str, num_envs: int, rollouts: int) -> dict[str, float]:
