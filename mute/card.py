@@ -64,6 +64,13 @@ _RATES = {
     "loop_over_engine": ("loop / engine", "{:.0%}"),
     "peak_memory_mb": ("memory (MB)", "{:,.0f}"),
 }
+_PEERS = {
+    "name": ("peer", "{}"),
+    "version": ("version", "{}"),
+    "num_envs": ("environments", "{}"),
+    "steps_per_second": ("control steps/s", "{:,.0f}"),
+    "note": ("what it steps", "{}"),
+}
 
 
 @dataclass
@@ -111,6 +118,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     print(markdown(noise, _SOURCES))
     print(f"\nControl steps/s of `{benchmark['task']}` on {benchmark['machine']}:\n")
     print(markdown(benchmark["rates"], _RATES))
+    if benchmark.get("peers"):
+        print("\nOther simulations of a Go1 on the same CPU, timed after that:\n")
+        print(markdown(benchmark["peers"], _PEERS))
     return 0
 
 

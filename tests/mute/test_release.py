@@ -10,6 +10,7 @@ from learning_helpers import make_runner
 
 from mute import card, release
 from mute.command_lines import evaluate
+from mute.command_lines.arguments import REPOSITORY
 from mute.errors import MuteError
 from mute.evaluation.tables import read_json, write_json
 
@@ -78,6 +79,14 @@ def test_markdown_formats_each_column_and_leaves_a_dash_for_what_is_missing():
 def test_a_card_that_is_missing_is_named(tmp_path):
     with pytest.raises(MuteError, match="nowhere"):
         card.main(["--card", str(tmp_path / "nowhere.json")])
+
+
+def test_the_readmes_tables_are_those_that_the_card_prints(capsys):
+    assert card.main([]) == 0
+    readme = (REPOSITORY / "README.md").read_text()
+    lines = [line for line in capsys.readouterr().out.splitlines() if line]
+    assert len(lines) > 40
+    assert [line for line in lines if line not in readme] == []
 
 
 def test_a_released_policy_is_small(run, tmp_path):
