@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import re
 import signal
 import socket
 import statistics
@@ -105,8 +104,12 @@ def _iterations(run: Path) -> list[float]:
 
 
 def _names_our_code(errors: str) -> bool:
-    """Tell whether a traceback goes through the project's files; torchrun prints its own."""
-    return re.search(rf'File "{REPO}', errors) is not None
+    """Tell whether a traceback goes through the project's files; torchrun prints its own.
+
+    Those of packages do not count, wherever their environment lies: it may be in the project.
+    """
+    files = [line for line in errors.splitlines() if f'File "{REPO}' in line]
+    return any("site-packages" not in line for line in files)
 
 
 # -- learning together -----------------------------------------------------------------------------
