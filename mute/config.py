@@ -27,8 +27,10 @@ class EstimationCfg:
     """Weight of the phase loss."""
     lambda_kl: float = 1.0e-3
     """Weight of the KL divergence inside the forward model's loss."""
+    robots_share: float = 1.0
+    """Share of the robots that an update learns from, drawn anew for each."""
     num_mini_batches: int = 4
-    """Parts that the environments are split into; each makes one step of the optimiser."""
+    """Parts that those robots are split into; each makes one step of the optimiser."""
     max_grad_norm: float = 1.0
     """Bound on the gradient's norm."""
     actor_uses_phase: bool = True
@@ -43,6 +45,14 @@ class EstimationCfg:
         _check_from(1, self, "agent.estimation", "num_mini_batches")
         _check_positive(self, "agent.estimation", "learning_rate", "max_grad_norm")
         _check_from(0, self, "agent.estimation", "lambda_fwd", "lambda_phase", "lambda_kl")
+        if not 0.0 < self.robots_share <= 1.0:
+            raise ValueError(
+                f"agent.estimation.robots_share must be in (0, 1], got {self.robots_share}"
+            )
+
+    def robots_learnt_from(self, num_envs: int) -> int:
+        """Return how many of a number of robots an update learns from."""
+        return max(1, round(self.robots_share * num_envs))
 
 
 @dataclass
@@ -188,9 +198,11 @@ class TaskCfg:
                 "agent.ppo.num_mini_batches must be <= env.num_envs * agent.num_steps_per_env = "
                 f"{samples}, got {agent.ppo.num_mini_batches}"
             )
-        if agent.estimation.num_mini_batches > num_envs:
+        robots = agent.estimation.robots_learnt_from(num_envs)
+        if agent.estimation.num_mini_batches > robots:
             raise ValueError(
-                f"agent.estimation.num_mini_batches must be <= env.num_envs = {num_envs}, "
+                "agent.estimation.num_mini_batches must be <= env.num_envs * "
+                f"agent.estimation.robots_share = {robots}, "
                 f"got {agent.estimation.num_mini_batches}"
             )
 

@@ -209,7 +209,8 @@ class EstimatorTrainer:
         starts = past["starts"]
         num_envs = starts.shape[1]
         sums: dict[str, float] = {}
-        batches = torch.randperm(num_envs, device=starts.device).chunk(self.cfg.num_mini_batches)
+        drawn = torch.randperm(num_envs, device=starts.device)
+        batches = drawn[: self.cfg.robots_learnt_from(num_envs)].chunk(self.cfg.num_mini_batches)
         for env_ids in batches:
             state = (past["hidden"][env_ids], past["cell"][env_ids])
             estimate, _ = self.estimator.unroll(

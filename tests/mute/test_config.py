@@ -94,6 +94,8 @@ def test_data_that_does_not_fit_is_refused_in_one_line_that_names_the_place(data
         (PPOCfg, "lam", -0.1, "agent.ppo.lam"),
         (PPOCfg, "entropy_coef", -0.1, "agent.ppo.entropy_coef"),
         (EstimationCfg, "num_mini_batches", 0, "agent.estimation.num_mini_batches"),
+        (EstimationCfg, "robots_share", 0.0, "agent.estimation.robots_share"),
+        (EstimationCfg, "robots_share", 1.1, "agent.estimation.robots_share"),
         (EstimationCfg, "learning_rate", -1.0, "agent.estimation.learning_rate"),
         (EstimationCfg, "lambda_kl", -1.0, "agent.estimation.lambda_kl"),
     ],
@@ -123,6 +125,13 @@ def test_more_mini_batches_than_samples_are_refused():
 def test_more_mini_batches_of_the_estimator_than_robots_are_refused():
     env = QuadrupedEnvCfg(num_envs=4)
     TaskCfg(env, AgentCfg(estimation=EstimationCfg(num_mini_batches=4)))
-    words = r"agent\.estimation\.num_mini_batches must be <= env\.num_envs = 4, got 5"
+    words = r"agent\.estimation\.num_mini_batches must be <= env\.num_envs \* .* = 4, got 5"
     with pytest.raises(ValueError, match=words):
         TaskCfg(env, AgentCfg(estimation=EstimationCfg(num_mini_batches=5)))
+
+
+def test_a_share_of_the_robots_counts_against_the_mini_batches_of_the_estimator():
+    env = QuadrupedEnvCfg(num_envs=8)
+    TaskCfg(env, AgentCfg(estimation=EstimationCfg(num_mini_batches=4, robots_share=0.5)))
+    with pytest.raises(ValueError, match=r"env\.num_envs \* .*robots_share = 4, got 5"):
+        TaskCfg(env, AgentCfg(estimation=EstimationCfg(num_mini_batches=5, robots_share=0.5)))

@@ -154,10 +154,15 @@ def _make_rollout(index: int, ends: set[tuple[int, int]]) -> RolloutStorage:
     return storage
 
 
-def _make_trainer(learning_rate: float = 1.0e-3) -> EstimatorTrainer:
+def _make_trainer(learning_rate: float = 1.0e-3, robots_share: float = 1.0) -> EstimatorTrainer:
     torch.manual_seed(0)
     estimator = Estimator(OBS_DIM, NUM_HEIGHTS, NETWORK)
-    cfg = EstimationCfg(network=NETWORK, num_mini_batches=1, learning_rate=learning_rate)
+    cfg = EstimationCfg(
+        network=NETWORK,
+        num_mini_batches=1,
+        learning_rate=learning_rate,
+        robots_share=robots_share,
+    )
     return EstimatorTrainer(estimator, cfg, PRIVILEGED, min_steps=2, max_steps=50)
 
 
@@ -251,6 +256,22 @@ def test_the_unrolled_state_is_the_past_rollouts_and_zeroed_where_episodes_begin
     assert bool(first[1][0].all())
     assert second[1].nonzero().tolist() == [[0, 0], [6, 1]]
     assert second[2] is True
+
+
+def test_each_update_learns_from_a_share_of_the_robots_drawn_anew(monkeypatch):
+    trainer = _make_trainer(robots_share=2 / 3)
+    seen: list[list[int]] = []
+    losses = estimation.estimator_losses
+
+    def spy(estimate, decoded, labels, cfg, ranks):
+        seen.append(sorted(int(env_id) for env_id in labels.base_lin_vel[0, :, 0]))
+        return losses(estimate, decoded, labels, cfg, ranks)
+
+    monkeypatch.setattr(estimation, "estimator_losses", spy)
+    state = trainer.estimator.initial_state(NUM_ENVS)
+    for index in range(20):
+        trainer.update(_make_rollout(index, set()), state)
+    assert {tuple(env_ids) for env_ids in seen} == {(0, 1), (0, 2), (1, 2)}
 
 
 def test_what_is_learnt_from_does_not_change_with_the_storage():
