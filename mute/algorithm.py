@@ -26,6 +26,8 @@ class EstimatorPPO(PPO):
     on the first mini-batch, and no gradient of theirs reaches the estimator.
     """
 
+    actor: PreparedModel  # pyright: ignore[reportIncompatibleVariableOverride]
+    critic: PreparedModel  # pyright: ignore[reportIncompatibleVariableOverride]
     env: EstimatedEnv
     """Where the estimator runs."""
     trainer: EstimatorTrainer

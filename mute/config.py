@@ -117,6 +117,8 @@ class AgentCfg:
     """Widths of the critic's hidden layers."""
     activation: Literal["elu", "relu", "selu", "tanh"] = "elu"
     """Activation of actor and critic."""
+    symmetric: bool = False
+    """Whether the networks treat left and right alike, see `networks.reflection`."""
     init_std: float = 1.0
     """Standard deviation of the actions at the start."""
     std_range: tuple[float, float] = (0.05, 1.2)
@@ -142,11 +144,27 @@ class AgentCfg:
             widths = getattr(self, name)
             if not widths or min(widths) < 1:
                 raise ValueError(f"agent.{name} must be widths >= 1, got {widths}")
+        if self.symmetric:
+            self._check_even_widths()
         low, high = self.std_range
         if not 0.0 < low <= high:
             raise ValueError(
                 f"agent.std_range must be (low, high) with 0 < low <= high, got {self.std_range}"
             )
+
+    def _check_even_widths(self) -> None:
+        network = self.estimation.network
+        widths = {
+            "actor_hidden": self.actor_hidden,
+            "critic_hidden": self.critic_hidden,
+            "estimation.network.lstm_hidden": (network.lstm_hidden,),
+            "estimation.network.latent_dim": (network.latent_dim,),
+            "estimation.network.decoder_hidden": network.decoder_hidden,
+            "estimation.network.phase_hidden": network.phase_hidden,
+        }
+        for name, values in widths.items():
+            if any(width % 2 for width in values):
+                raise ValueError(f"agent.{name} must be even for agent.symmetric, got {values}")
 
     def rsl_rl(self) -> dict[str, Any]:
         """Return the configuration that rsl_rl's runner takes."""

@@ -25,6 +25,7 @@ from mute.estimated_env import EstimatedEnv
 from mute.estimation import EstimatorTrainer
 from mute.evaluation.noise_probe import NoiseProbe
 from mute.logger import TrainingLogger
+from mute.symmetry import tie_networks
 from mute.threads import core_share, use_collection_threads
 from networks.estimator import Estimator
 
@@ -85,6 +86,9 @@ class MuteRunner(OnPolicyRunner):
             estimator, estimation, env.privileged_slices, feet.min_steps, feet.max_steps
         )
         self.alg.attach(estimated, trainer, self.ranks)
+        if cfg.agent.symmetric:
+            models = (self.alg.actor, self.alg.critic)
+            tie_networks(env, estimator, *models, with_phase=estimation.actor_uses_phase)
         self.logger = TrainingLogger(
             log_dir=str(log_dir) if log_dir else None,
             cfg=self.cfg,

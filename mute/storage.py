@@ -15,11 +15,46 @@ from rsl_rl.modules import HiddenState
 from rsl_rl.storage import RolloutStorage
 from tensordict import TensorDict
 
+from networks.reflection import Reflection, tie_mlp, tie_vector
+
 __all__ = ["PreparedModel", "PreparedStorage"]
 
 
 class PreparedModel(MLPModel):
-    """rsl_rl's model, which takes its input ready made where the observations hold it."""
+    """rsl_rl's model, which takes its input ready made where the observations hold it.
+
+    It can be made to treat left and right alike, see `tie`.
+    """
+
+    reflection: Reflection | None = None
+    """How its input is mirrored, if it is tied."""
+
+    def tie(self, source: Reflection, target: Reflection) -> None:
+        """Make it commute with the reflections of its input and output, now and as it learns.
+
+        Raises:
+            ValueError: If the width of a hidden layer is odd.
+        """
+        self.reflection = source
+        tie_mlp(self.mlp, source, target)
+        if self.distribution is not None:
+            for deviation in self.distribution.parameters():
+                tie_vector(deviation, target.unsigned)
+
+    def update_normalization(self, obs: TensorDict) -> None:
+        """Learn the input's mean and variance, those of its mirror image included if tied."""
+        super().update_normalization(obs)
+        if self.reflection is None:
+            return
+        normalizer = self.obs_normalizer
+        mean, variance = normalizer.get_buffer("_mean"), normalizer.get_buffer("_var")
+        image = self.reflection(mean)
+        # The variance of two halves of the data is the mean of theirs and that of their means.
+        normalizer._var = (
+            0.5 * (variance + self.reflection.unsigned(variance)) + (0.5 * (mean - image)).square()
+        )
+        normalizer._mean = 0.5 * (mean + image)
+        normalizer._std = normalizer._var.sqrt()
 
     def get_latent(
         self,

@@ -14,6 +14,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from networks.reflection import Reflection, tie_layer, tie_mlp, tie_vector
+
 State = tuple[Tensor, Tensor]
 """Hidden and cell state of the LSTM, each of shape (N, lstm_hidden)."""
 
@@ -123,6 +125,38 @@ class Estimator(nn.Module):
         self.decoder = _mlp(cfg.latent_dim, cfg.decoder_hidden, obs_dim, activation)
         phase_inputs = num_heights + 3 + cfg.latent_dim
         self.phase_network = _mlp(phase_inputs, cfg.phase_hidden, num_feet, activation)
+
+    def tie(
+        self,
+        obs: Reflection,
+        base_lin_vel: Reflection,
+        heights: Reflection,
+        feet: Reflection,
+    ) -> None:
+        """Make it commute with a reflection, now and as it learns; the latent swaps its halves.
+
+        Args:
+            obs: Reflection of an observation.
+            base_lin_vel: Reflection of the velocity.
+            heights: Reflection of the height map.
+            feet: Reflection of the phases.
+
+        Raises:
+            ValueError: If the width of a layer is odd.
+        """
+        hidden = Reflection.swapped(self.cfg.lstm_hidden)
+        latent = Reflection.swapped(self.cfg.latent_dim)
+        gates = Reflection.joined([hidden] * 4)
+        tie_layer(self.lstm.weight_ih, obs, gates)
+        tie_layer(self.lstm.weight_hh, hidden, gates)
+        tie_vector(self.lstm.bias_ih, gates)
+        tie_vector(self.lstm.bias_hh, gates)
+        tie_mlp(self.base_lin_vel_head, hidden, base_lin_vel)
+        tie_mlp(self.heights_head, hidden, heights)
+        tie_mlp(self.latent_mean_head, hidden, latent)
+        tie_mlp(self.latent_log_var_head, hidden, latent)
+        tie_mlp(self.decoder, latent, obs)
+        tie_mlp(self.phase_network, Reflection.joined([heights, base_lin_vel, latent]), feet)
 
     def initial_state(self, num_envs: int, device: torch.device | str | None = None) -> State:
         """Return the zero state; it lies with the weights unless another device is given."""
