@@ -59,8 +59,10 @@ class EstimatorPPO(PPO):
         """Sample actions, see `PPO.act`; remember the LSTM state that the rollout began with."""
         if self.storage.step == 0:
             self._rollout_state = self.env.state_before
-            use_collection_threads()
-        return super().act(obs)
+        use_learning_threads()
+        actions = super().act(obs)
+        use_collection_threads()
+        return actions
 
     def compute_returns(self, obs: TensorDict) -> None:
         """Compute returns and advantages, see `PPO.compute_returns`.

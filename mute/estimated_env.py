@@ -99,6 +99,7 @@ class EstimatedEnv(VecEnv):
         observations, rewards, dones, extras = self.env.step(actions.to(self.env.device))
         ended = dones.to(self.device).unsqueeze(1)
         hidden, cell = self.state
+        use_learning_threads()
         self._consume(observations, (hidden.masked_fill(ended, 0.0), cell.masked_fill(ended, 0.0)))
         return self._observations, rewards, dones, extras
 

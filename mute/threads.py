@@ -33,9 +33,9 @@ def configure_threads() -> None:
 
 
 def use_collection_threads() -> None:
-    """Let torch run on one thread while the physics engine uses all cores.
+    """Let torch run on one thread around the physics engine, which uses all cores.
 
-    The control step's tensors are too small to gain from more, and OpenMP's workers would take the
+    The environment's tensors are too small to gain from more, and OpenMP's workers would take the
     cores from the engine's at every one of its calls.
     """
     import torch
@@ -44,7 +44,7 @@ def use_collection_threads() -> None:
 
 
 def use_learning_threads() -> None:
-    """Let torch run on every core it was given, while no simulation runs."""
+    """Let torch run on every core it was given, for the networks, while no simulation runs."""
     import torch
 
     torch.set_num_threads(_learning_threads())

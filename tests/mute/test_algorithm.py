@@ -214,3 +214,29 @@ def test_what_is_saved_holds_all_networks_and_both_optimisers():
     assert saved["optimizer_state_dict"]["state"]
     assert saved["estimator_trainer"]["optimizer"]["state"]
     assert saved["estimator_trainer"]["past"]["obs"].shape[:2] == (NUM_STEPS, NUM_ENVS)
+
+
+def test_networks_act_on_all_cores_and_the_engine_has_them_to_itself(monkeypatch):
+    monkeypatch.setattr("mute.threads._learning_threads", lambda: 2)
+    runner = make_runner(iterations=1)
+    networks, world = set(), set()
+    env, threads = runner.env.env, torch.get_num_threads()
+    step, estimate = env.step, runner.env.estimator.step
+
+    def spied_step(actions):
+        world.add(torch.get_num_threads())
+        return step(actions)
+
+    def spied_estimate(obs, state):
+        networks.add(torch.get_num_threads())
+        return estimate(obs, state)
+
+    monkeypatch.setattr(env, "step", spied_step)
+    monkeypatch.setattr(runner.env.estimator, "step", spied_estimate)
+    for model in (runner.alg.actor, runner.alg.critic):
+        model.mlp.register_forward_hook(lambda *_: networks.add(torch.get_num_threads()))
+    try:
+        runner.train()
+    finally:
+        torch.set_num_threads(threads)
+    assert (networks, world) == ({2}, {1})
