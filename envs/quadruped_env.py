@@ -217,7 +217,7 @@ class QuadrupedEnv(VecEnv):
         self.episode_length_buf += 1
         self._read_state()
         terminated = self._terminated()
-        reward, shares = self.reward_sum(self._motion(), self.quiet, self.lift)
+        reward, shares = self.reward_sum(self._motion(), self.quiet, self.lift, self.guide)
         time_outs = (self.episode_length_buf >= self.max_episode_length) & ~terminated
         dones = terminated | time_outs
         # What an unstable simulation did is not the policy's merit or fault.
@@ -241,6 +241,11 @@ class QuadrupedEnv(VecEnv):
     def lift(self) -> float:
         """Curriculum factor in [0, 1] on the rewards that hold the feet up."""
         return self._ramp(self.cfg.rewards.lift_ramp)
+
+    @property
+    def guide(self) -> float:
+        """Curriculum factor in [0, 1] on the rewards that lead to a first walk."""
+        return 1.0 - self._ramp(self.cfg.rewards.guide_ramp)
 
     def _ramp(self, bounds: tuple[float, float]) -> float:
         start, end = bounds
@@ -492,6 +497,7 @@ class QuadrupedEnv(VecEnv):
         for name, share in (
             ("quiet", self.quiet),
             ("lift", self.lift),
+            ("guide", self.guide),
             ("commands", self._ramp(self.cfg.commands.ramp)),
         ):
             log[f"Curriculum/{name}"] = torch.full((), share, device=self.device)

@@ -1,4 +1,4 @@
-"""Reward terms: the paper's Table I, and the few that keep the feet lifting.
+"""Reward terms: the paper's Table I, and the few that lead to a walk and keep the feet lifting.
 
 Each term is a pure function of `Motion`, without weight, named as its field in `RewardsCfg`. The
 sum is r = beta r_phase + (1 - k beta) r_task + r_other (paper, eq. 6).
@@ -113,6 +113,9 @@ class RewardsCfg:
     """sum over joints of the distance to the stance, while asked to stand."""
     tilt: float = 0.0
     """|g_xy|^2 once more, in the lift group: a first step is not taken level."""
+    diagonal_support: float = 0.0
+    """half |c_FR + c_RL - c_FL - c_RR| of the contacts c, unless asked to stand; not in the
+    paper."""
     fall: float = 0.0
     """1 in the step that ends an episode by a fall; not in the paper."""
 
@@ -132,6 +135,9 @@ class RewardsCfg:
     lift_ramp: tuple[float, float] = (0.0, 0.0)
     """The same for the lift group: shuffling and falling, which it forbids, are how walking
     begins."""
+    guide_ramp: tuple[float, float] = (0.0, 0.0)
+    """The same for the guide group, whose weight falls from 1 to 0: once the robot walks, its gait
+    is its own. With (0, 0) it has none."""
 
     def __post_init__(self) -> None:
         """Check what the weights cannot express.
@@ -149,7 +155,7 @@ class RewardsCfg:
                 raise ValueError(f"rewards.{name} must be finite, got {value}")
         if not 0.0 <= self.k <= 1.0:
             raise ValueError(f"rewards.k must be in [0, 1], got {self.k}")
-        for name in ("quiet_ramp", "lift_ramp"):
+        for name in ("quiet_ramp", "lift_ramp", "guide_ramp"):
             start, end = getattr(self, name)
             if not 0.0 <= start <= end:
                 raise ValueError(
@@ -281,6 +287,18 @@ def fall(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
     return motion.fallen.float()
 
 
+def diagonal_support(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
+    """Reward standing on the feet of one diagonal alone, which nothing but a trot can do.
+
+    Two feet balance a robot for as long as it takes to tip over: it has to step, and as often on
+    one diagonal as on the other.
+    """
+    moving = (motion.command[:, :3] != 0.0).any(dim=1)
+    front_right, front_left, rear_right, rear_left = motion.contact.float().unbind(dim=1)
+    difference = front_right + rear_left - front_left - rear_right
+    return 0.5 * difference.abs() * moving
+
+
 Term = Callable[[Motion, RewardsCfg], torch.Tensor]
 
 GROUPS: dict[str, tuple[Term, ...]] = {
@@ -299,8 +317,9 @@ GROUPS: dict[str, tuple[Term, ...]] = {
         power_distribution,
     ),
     "lift": (foot_clearance, touchdown_apex, foot_slip, stand_still, tilt, fall),
+    "guide": (diagonal_support,),
 }
-"""Terms by the factor they get: (1 - k beta), beta times a ramp, 1, and a ramp."""
+"""Terms by the factor they get: (1 - k beta), beta times a ramp, 1, a ramp, and one that falls."""
 
 TERMS: dict[str, Term] = {term.__name__: term for terms in GROUPS.values() for term in terms}
 """Every term by its name, which is its weight's field in `RewardsCfg`."""
@@ -338,7 +357,7 @@ class RewardSum:
         self._step_dt = step_dt
 
     def __call__(
-        self, motion: Motion, quiet: float, lift: float
+        self, motion: Motion, quiet: float, lift: float, guide: float
     ) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
         """Return the reward of a control step and each term's share of it.
 
@@ -346,6 +365,7 @@ class RewardSum:
             motion: The control step.
             quiet: Curriculum factor in [0, 1] on the phase group.
             lift: Curriculum factor in [0, 1] on the lift group.
+            guide: Curriculum factor in [0, 1] on the guide group.
 
         Returns:
             The reward, shape (num_envs,), and by name each term's mean over the environments with
@@ -358,5 +378,6 @@ class RewardSum:
         weighted[self._rows["task"]] *= 1.0 - self.cfg.k * beta
         weighted[self._rows["phase"]] *= quiet * beta
         weighted[self._rows["lift"]] *= lift
+        weighted[self._rows["guide"]] *= guide
         means = weighted.mean(dim=1) / self._step_dt
         return weighted.sum(dim=0), dict(zip(self.names, means.unbind(), strict=True))

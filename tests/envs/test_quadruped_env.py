@@ -442,6 +442,21 @@ def test_without_a_ramp_quiet_is_full_from_the_start():
     assert _make_env(1).quiet == 1.0
 
 
+def test_the_guide_leaves_the_reward_with_the_simulated_time():
+    rewards = RewardsCfg(guide_ramp=(0.04, 0.12), diagonal_support=1.0)
+    env = _make_env(1, rewards=rewards)
+    guide = [env.guide]
+    for _ in range(7):
+        log = _stand_still(env)[3]["log"]
+        guide.append(env.guide)
+        assert log["Curriculum/guide"].item() == pytest.approx(env.guide)
+    assert guide == pytest.approx([1.0, 1.0, 1.0, 0.75, 0.5, 0.25, 0.0, 0.0])
+
+
+def test_without_a_ramp_there_is_no_guide():
+    assert _make_env(1).guide == 0.0
+
+
 @pytest.mark.parametrize(("source", "differs"), [("estimated", True), ("true", False)])
 def test_the_phase_that_was_handed_over_shapes_the_reward_where_it_is_asked_for(source, differs):
     rewards = []

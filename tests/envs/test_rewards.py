@@ -108,6 +108,14 @@ CASES = {
         [0.3, 0.0],
     ),
     "tilt": ({"projected_gravity": [[0.3, -0.4, -0.86], [0, 0, -1.0]]}, [0.25, 0.0]),
+    "diagonal_support": (
+        # FR and RL alone; FR, RL and RR; FL alone; all; FL and RR, but asked to stand.
+        {
+            "command": [[0.5], [0, 0.5], [0, 0, 0.5], [0.5], [0, 0, 0, 1.0]],
+            "contact": [[1, 0, 0, 1], [1, 0, 1, 1], [0, 1, 0, 0], [1, 1, 1, 1], [0, 1, 1, 0]],
+        },
+        [1.0, 0.5, 0.5, 0.0, 0.0],
+    ),
     "fall": ({"fallen": [False, True]}, [0.0, 1.0]),
 }
 
@@ -163,7 +171,7 @@ def test_every_term_is_named_as_its_weight_and_stands_in_one_group():
     assert len(names) == len(set(names))
     constants = {
         "k", "desired_height", "clearance_target", "apex_target", "phase_source", "quiet_ramp",
-        "lift_ramp",
+        "lift_ramp", "guide_ramp",
     }  # fmt: skip
     assert set(names) == set(TERMS) == {field.name for field in fields(RewardsCfg)} - constants
 
@@ -197,29 +205,31 @@ def test_default_weights_are_those_of_the_paper():
 )
 def test_beta_weighs_a_term_by_its_group(name, case, factors):
     motion = _make_motion(command=[[0, 0, 0, 0.0], [0, 0, 0, 1.0]], **case)
-    reward, _ = _make_sum(_make_cfg(k=0.2, **{name: 3.0}))(motion, 1.0, 1.0)
+    reward, _ = _make_sum(_make_cfg(k=0.2, **{name: 3.0}))(motion, 1.0, 1.0, 1.0)
     torch.testing.assert_close(reward, 3.0 * STEP_DT * torch.tensor(factors))
 
 
 def test_k_decides_how_much_of_the_task_reward_beta_gives_up():
     motion = _make_motion(command=[[0, 0, 0, 0.5], [0, 0, 0, 1.0]])
-    reward, _ = _make_sum(_make_cfg(k=0.6, ang_vel_tracking=1.0))(motion, 1.0, 1.0)
+    reward, _ = _make_sum(_make_cfg(k=0.6, ang_vel_tracking=1.0))(motion, 1.0, 1.0, 1.0)
     torch.testing.assert_close(reward, STEP_DT * torch.tensor([0.7, 0.4]))
 
 
 def test_each_curriculum_scales_its_group_alone():
     motion = _make_motion(
-        command=[[0, 0, 0, 0.5], [0, 0, 0, 1.0]],
+        command=[[1.0, 0, 0, 0.5], [1.0, 0, 0, 1.0]],
+        base_lin_vel=[[1.0], [1.0]],
         landing_speed=[[1.0], [1.0]],
-        contact=[[1], [1]],
+        contact=[[1], [1, 0, 0, 1]],
         foot_speed_xy=[[1.0], [2.0]],
     )
     cfg = _make_cfg(
-        k=0.2, landing_speed=-4.0, lin_vel_tracking=1.0, base_height=-1.0, foot_slip=-1.0
-    )
-    reward, _ = _make_sum(cfg)(motion, 0.25, 0.5)
-    # 1 - k beta, minus 4 quiet beta, minus 0.3^2, minus lift v^2.
-    expected = torch.tensor([0.9 - 0.5 - 0.09 - 0.5, 0.8 - 1.0 - 0.09 - 2.0])
+        k=0.2, landing_speed=-4.0, lin_vel_tracking=1.0, base_height=-1.0, foot_slip=-1.0,
+        diagonal_support=2.0,
+    )  # fmt: skip
+    reward, _ = _make_sum(cfg)(motion, 0.25, 0.5, 0.125)
+    # 1 - k beta, minus 4 quiet beta, minus 0.3^2, minus lift v^2, plus 2 guide (one foot, or two).
+    expected = torch.tensor([0.9 - 0.5 - 0.09 - 0.5 + 0.125, 0.8 - 1.0 - 0.09 - 2.0 + 0.25])
     torch.testing.assert_close(reward, STEP_DT * expected)
 
 
@@ -227,7 +237,9 @@ def test_the_shares_are_means_per_second_and_add_up_to_the_reward():
     motion = _make_motion(
         command=[[0, 0, 0, 0.0], [0, 0, 0, 1.0]], base_lin_vel=[[0, 0, 1.0], [0, 0, 2.0]]
     )
-    reward, shares = _make_sum(_make_cfg(lin_vel_tracking=1.0, lin_vel_z=-2.0))(motion, 1.0, 1.0)
+    reward, shares = _make_sum(_make_cfg(lin_vel_tracking=1.0, lin_vel_z=-2.0))(
+        motion, 1.0, 1.0, 1.0
+    )
     assert {name: share.item() for name, share in shares.items()} == pytest.approx(
         {"lin_vel_tracking": 0.9, "lin_vel_z": -5.0}
     )
@@ -237,16 +249,16 @@ def test_the_shares_are_means_per_second_and_add_up_to_the_reward():
 def test_a_term_without_weight_is_neither_evaluated_nor_listed():
     motion = _make_motion(joint_acc=[[math.nan], [math.nan]])
     reward_sum = _make_sum(_make_cfg(orientation=-1.0))
-    reward, shares = reward_sum(motion, 1.0, 1.0)
+    reward, shares = reward_sum(motion, 1.0, 1.0, 1.0)
     assert reward_sum.names == ["orientation"] == list(shares)
     assert reward.isfinite().all()
 
 
 def test_a_reward_is_not_changed_by_the_next_call():
     reward_sum = _make_sum(_make_cfg(collision=-1.0))
-    reward, shares = reward_sum(_make_motion(collisions=[1.0, 2.0]), 1.0, 1.0)
+    reward, shares = reward_sum(_make_motion(collisions=[1.0, 2.0]), 1.0, 1.0, 1.0)
     kept, kept_share = reward.clone(), shares["collision"].clone()
-    reward_sum(_make_motion(collisions=[5.0, 5.0]), 1.0, 1.0)
+    reward_sum(_make_motion(collisions=[5.0, 5.0]), 1.0, 1.0, 1.0)
     assert torch.equal(reward, kept)
     assert torch.equal(shares["collision"], kept_share)
 
@@ -259,6 +271,7 @@ def test_a_reward_is_not_changed_by_the_next_call():
         ("quiet_ramp", (2.0, 1.0)),
         ("quiet_ramp", (-1.0, 1.0)),
         ("lift_ramp", (2.0, 1.0)),
+        ("guide_ramp", (2.0, 1.0)),
         ("desired_height", 0.0),
         ("clearance_target", -0.1),
         ("apex_target", 0.0),

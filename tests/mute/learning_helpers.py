@@ -27,7 +27,14 @@ def make_cfg(iterations: int = 2, **env: Any) -> TaskCfg:
     """
     ramp = (0.0, 0.8)
     curricula: dict[str, Any] = {
-        "rewards": RewardsCfg(quiet_ramp=ramp, lift_ramp=ramp, foot_slip=-0.04, stand_still=-0.1),
+        "rewards": RewardsCfg(
+            quiet_ramp=ramp,
+            lift_ramp=ramp,
+            guide_ramp=ramp,
+            foot_slip=-0.04,
+            stand_still=-0.1,
+            diagonal_support=0.5,
+        ),
         "commands": CommandsCfg(initial_share=0.2, ramp=ramp, resampling_time=0.04),
         "randomization": RandomizationCfg(push_interval=0.06),
     }

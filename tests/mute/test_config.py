@@ -32,12 +32,12 @@ def test_every_task_comes_back_equal_from_plain_data_and_from_yaml(task):
 def test_a_changed_field_of_every_depth_comes_back():
     cfg = make_task("go1_mute")
     cfg.env.rewards.quiet_ramp = (1.0, 2.5)
-    cfg.agent.actor_hidden = (7,)
-    cfg.agent.estimation.network.latent_dim = 5
+    cfg.agent.actor_hidden = (6,)
+    cfg.agent.estimation.network.latent_dim = 6
     back = from_plain(to_plain(cfg))
     assert back.env.rewards.quiet_ramp == (1.0, 2.5)
-    assert back.agent.actor_hidden == (7,)
-    assert back.agent.estimation.network.latent_dim == 5
+    assert back.agent.actor_hidden == (6,)
+    assert back.agent.estimation.network.latent_dim == 6
 
 
 def test_plain_data_shares_nothing_with_the_configuration():

@@ -31,7 +31,7 @@ ENGINES = ("mjbatch", "warp")
 def _make_env(engine, num_envs):
     """Make robots with physics and observations as in training, and every reward at full weight."""
     cfg = evaluation_cfg(POLICY.cfg.env, num_envs, 30.0, seed=3, randomized=True)
-    ramps = {"quiet_ramp": (0.0, 0.0), "lift_ramp": (0.0, 0.0)}
+    ramps = {"quiet_ramp": (0.0, 0.0), "lift_ramp": (0.0, 0.0), "guide_ramp": (50.0, 100.0)}
     rewards = dataclasses.replace(cfg.rewards, phase_source="true", **ramps)
     env = QuadrupedEnv(dataclasses.replace(cfg, engine=engine, num_threads=1, rewards=rewards))
     command = torch.zeros(num_envs, 4)

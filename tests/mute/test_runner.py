@@ -55,6 +55,8 @@ def test_every_curriculum_is_on_its_way_where_these_runs_are_resumed(whole_run):
         values = [line[f"Curriculum/{name}"] for line in _curves(directory)]
         # Steps of 20 ms on a ramp of 0.8 s: the means of 1-8, 9-16, 17-24 and 25-32 over 40.
         assert values == pytest.approx([0.1125, 0.3125, 0.5125, 0.7125], abs=1e-6)
+    guide = [line["Curriculum/guide"] for line in _curves(directory)]
+    assert guide == pytest.approx([0.8875, 0.6875, 0.4875, 0.2875], abs=1e-6)
 
 
 def test_a_forgotten_curriculum_would_change_what_a_resumed_run_learns(whole_run, tmp_path):
