@@ -114,8 +114,8 @@ class RewardsCfg:
     tilt: float = 0.0
     """|g_xy|^2 once more, in the lift group: a first step is not taken level."""
     diagonal_support: float = 0.0
-    """half |c_FR + c_RL - c_FL - c_RR| of the contacts c, unless asked to stand; not in the
-    paper."""
+    """half |c_FR + c_RL - c_FL - c_RR| of the contacts c, unless asked to stand; not in the paper.
+    It counts while `guide_ramp` lasts."""
     fall: float = 0.0
     """1 in the step that ends an episode by a fall; not in the paper."""
 
@@ -162,6 +162,11 @@ class RewardsCfg:
                     f"rewards.{name} must be (start, end) with 0 <= start <= end, "
                     f"got {(start, end)}"
                 )
+        if self.diagonal_support != 0.0 and self.guide_ramp[1] == 0.0:
+            raise ValueError(
+                "rewards.guide_ramp must end after 0 s where rewards.diagonal_support is "
+                f"{self.diagonal_support}, got {self.guide_ramp}"
+            )
         for name in ("desired_height", "clearance_target", "apex_target"):
             if getattr(self, name) <= 0.0:
                 raise ValueError(f"rewards.{name} must be > 0, got {getattr(self, name)}")
@@ -288,10 +293,10 @@ def fall(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
 
 
 def diagonal_support(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
-    """Reward standing on the feet of one diagonal alone, which nothing but a trot can do.
+    """Reward the difference between the diagonals: 1 for standing on one alone, as a trot does.
 
-    Two feet balance a robot for as long as it takes to tip over: it has to step, and as often on
-    one diagonal as on the other.
+    Two feet balance a robot for as long as it takes to tip over, so it has to step to earn that.
+    One foot off the ground, or one on it, earns half.
     """
     moving = (motion.command[:, :3] != 0.0).any(dim=1)
     front_right, front_left, rear_right, rear_left = motion.contact.float().unbind(dim=1)

@@ -13,7 +13,7 @@ from mute.distributed import Ranks
 from mute.estimated_env import EstimatedEnv
 from mute.estimation import EstimatorTrainer
 from mute.storage import PreparedModel, PreparedStorage
-from mute.threads import use_collection_threads, use_learning_threads
+from mute.threads import use_learning_threads
 from networks.estimator import State
 
 __all__ = ["EstimatorPPO"]
@@ -59,10 +59,8 @@ class EstimatorPPO(PPO):
         """Sample actions, see `PPO.act`; remember the LSTM state that the rollout began with."""
         if self.storage.step == 0:
             self._rollout_state = self.env.state_before
-        use_learning_threads()
-        actions = super().act(obs)
-        use_collection_threads()
-        return actions
+        use_learning_threads()  # whatever ran between two rollouts
+        return super().act(obs)
 
     def compute_returns(self, obs: TensorDict) -> None:
         """Compute returns and advantages, see `PPO.compute_returns`.

@@ -1,7 +1,10 @@
 """Measure the speed of training, part by part: python -m mute.benchmark.
 
-Every part is timed in one process and in turns with the bare engine, so that a machine whose speed
-drifts does not favour one of them. Each size runs in a process of its own, for its memory.
+Every part is timed in one process and in turns with the bare engine, and compared with its rollout
+of the same turn, so that a machine whose speed drifts does not favour one of them: a share is the
+median over turns, not the quotient of two rates. In all parts robots stand and are shaken by noise
+of the same deviation, less than a training begins with: what falls over takes longer to simulate,
+whatever steps it. Each size runs in a process of its own, for its memory.
 `--peers` times other ways to step a Go1 after that, see `mute.peers`.
 """
 
@@ -40,6 +43,9 @@ from mute.tasks import DEFAULT_TASK, make_task
 
 __all__ = ["BenchmarkArgs", "Rates", "measure"]
 
+_ACTION_STD = 0.4
+"""Standard deviation of the actions in every part."""
+
 
 @dataclass
 class BenchmarkArgs:
@@ -50,7 +56,7 @@ class BenchmarkArgs:
     num_envs: tuple[int, ...] = (256, 1024, 4096, 8192, 16384)
     """Numbers of environments."""
     rollouts: int = 5
-    """Rollouts that each part is timed over; the median counts."""
+    """Turns, each a rollout of every part; the medians count."""
     peers: Words = ()
     """Other simulations of a Go1 to time on the CPU as well: all, or some of gymnasium, mjlab and
     mujoco_playground; none if not given. The last two step as many robots as the smallest of
@@ -99,10 +105,12 @@ def measure(task: str, num_envs: int, rollouts: int) -> Rates:
     Args:
         task: Name of the task.
         num_envs: Number of environments.
-        rollouts: Rollouts to time.
+        rollouts: Turns to time.
     """
     cfg = make_task(task)
-    cfg = dataclasses.replace(cfg, env=dataclasses.replace(cfg.env, num_envs=num_envs))
+    env = dataclasses.replace(cfg.env, num_envs=num_envs)
+    agent = dataclasses.replace(cfg.agent, init_std=_ACTION_STD)
+    cfg = dataclasses.replace(cfg, env=env, agent=agent)
     torch.set_float32_matmul_precision(cfg.agent.matmul_precision)
     runner = MuteRunner(task, cfg, None)
     steps = cfg.agent.num_steps_per_env
@@ -121,12 +129,12 @@ def measure(task: str, num_envs: int, rollouts: int) -> Rates:
             part()
             if rollout > 0:  # the first one warms up, and the estimator only waits in it
                 times[name].append(time.perf_counter() - start)
-    seconds = {name: statistics.median(values) for name, values in times.items()}
-    rates = {name: num_envs * steps / value for name, value in seconds.items()}
-    rates["loop"] = num_envs * steps / (seconds["collection"] + seconds["learning"])
+    pairs = zip(times["collection"], times["learning"], strict=True)
+    times["loop"] = [collection + learning for collection, learning in pairs]
+    rates = {name: num_envs * steps / statistics.median(each) for name, each in times.items()}
     over_engine = {
-        f"{name}_over_engine": rate / rates["engine"]
-        for name, rate in rates.items()
+        f"{name}_over_engine": _median_ratio(times["engine"], each)
+        for name, each in times.items()
         if name != "engine"
     }
     return Rates(num_envs=num_envs, **rates, **over_engine, peak_memory_mb=peak_memory_mb())
@@ -176,11 +184,16 @@ def _in_process(task: str, num_envs: int, rollouts: int) -> dict[str, float]:
         raise MuteError(f"--num-envs {num_envs}: {error}") from error
 
 
+def _median_ratio(engine: Sequence[float], part: Sequence[float]) -> float:
+    """Return how fast a part is as a share of the engine, by turns."""
+    return statistics.median(one / other for one, other in zip(engine, part, strict=True))
+
+
 def _engine(env: QuadrupedEnv, steps: int) -> Callable[[], None]:
     batch = Batch(env.model, env.num_envs)
     ctrl = batch.bind("ctrl")
     batch.reset(keyframe=env.model.key("stand").id)
-    noise = 0.1 * torch.randn(steps, env.num_envs, NUM_ACTIONS)
+    noise = env.cfg.action_scale * _ACTION_STD * torch.randn(steps, env.num_envs, NUM_ACTIONS)
     targets = (env.stand + noise).double().numpy()
 
     def run() -> None:
@@ -192,7 +205,7 @@ def _engine(env: QuadrupedEnv, steps: int) -> Callable[[], None]:
 
 
 def _environment(env: QuadrupedEnv, steps: int) -> Callable[[], None]:
-    actions = 0.4 * torch.randn(steps, env.num_envs, NUM_ACTIONS)
+    actions = _ACTION_STD * torch.randn(steps, env.num_envs, NUM_ACTIONS)
 
     @torch.inference_mode()
     def run() -> None:

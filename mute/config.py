@@ -52,7 +52,7 @@ class EstimationCfg:
 
     def robots_learnt_from(self, num_envs: int) -> int:
         """Return how many of a number of robots an update learns from."""
-        return max(1, round(self.robots_share * num_envs))
+        return max(1, int(self.robots_share * num_envs))
 
 
 @dataclass
@@ -163,8 +163,9 @@ class AgentCfg:
             "estimation.network.phase_hidden": network.phase_hidden,
         }
         for name, values in widths.items():
-            if any(width % 2 for width in values):
-                raise ValueError(f"agent.{name} must be even for agent.symmetric, got {values}")
+            odd = [width for width in values if width % 2]
+            if odd:
+                raise ValueError(f"agent.{name} must be even for agent.symmetric, got {odd[0]}")
 
     def rsl_rl(self) -> dict[str, Any]:
         """Return the configuration that rsl_rl's runner takes."""
@@ -219,9 +220,15 @@ class TaskCfg:
         robots = agent.estimation.robots_learnt_from(num_envs)
         if agent.estimation.num_mini_batches > robots:
             raise ValueError(
-                "agent.estimation.num_mini_batches must be <= env.num_envs * "
-                f"agent.estimation.robots_share = {robots}, "
+                "agent.estimation.num_mini_batches must be <= the number of robots learnt from, "
+                f"env.num_envs * agent.estimation.robots_share or {robots}, "
                 f"got {agent.estimation.num_mini_batches}"
+            )
+        low, high = self.env.randomization.com_offset
+        if agent.symmetric and low != -high:
+            raise ValueError(
+                "env.randomization.com_offset must be (-x, x) for agent.symmetric, "
+                f"got {(low, high)}"
             )
 
 

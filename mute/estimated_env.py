@@ -13,7 +13,7 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
-from mute.threads import use_learning_threads
+from mute.threads import use_collection_threads, use_learning_threads
 from networks.estimator import Estimate, Estimator, State
 
 __all__ = ["EstimatedEnv", "estimate_group"]
@@ -96,10 +96,11 @@ class EstimatedEnv(VecEnv):
     ) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
         """Advance by one control step, see the class."""
         self.env.set_estimated_phase(self._estimate.phase.to(self.env.device))
+        use_collection_threads()
         observations, rewards, dones, extras = self.env.step(actions.to(self.env.device))
+        use_learning_threads()
         ended = dones.to(self.device).unsqueeze(1)
         hidden, cell = self.state
-        use_learning_threads()
         self._consume(observations, (hidden.masked_fill(ended, 0.0), cell.masked_fill(ended, 0.0)))
         return self._observations, rewards, dones, extras
 

@@ -25,7 +25,7 @@ from mute.estimated_env import EstimatedEnv
 from mute.estimation import EstimatorTrainer
 from mute.evaluation.noise_probe import NoiseProbe
 from mute.logger import TrainingLogger
-from mute.symmetry import tie_networks
+from mute.symmetry import groups, tie_actor_critic, tie_estimator
 from mute.threads import core_share, use_collection_threads
 from networks.estimator import Estimator
 
@@ -76,6 +76,8 @@ class MuteRunner(OnPolicyRunner):
         env = QuadrupedEnv(_own_share(cfg.env, self.ranks), device)
         estimation = cfg.agent.estimation
         estimator = Estimator(OBS_DIM, env.grid.shape[0], estimation.network).to(device)
+        if cfg.agent.symmetric:
+            tie_estimator(env, estimator)
         estimated = EstimatedEnv(env, estimator, device, estimation.actor_uses_phase)
         with contextlib.redirect_stdout(io.StringIO()):  # rsl_rl prints its networks
             super().__init__(
@@ -87,8 +89,8 @@ class MuteRunner(OnPolicyRunner):
         )
         self.alg.attach(estimated, trainer, self.ranks)
         if cfg.agent.symmetric:
-            models = (self.alg.actor, self.alg.critic)
-            tie_networks(env, estimator, *models, with_phase=estimation.actor_uses_phase)
+            by_group = groups(env, estimator.cfg.latent_dim, estimation.actor_uses_phase)
+            tie_actor_critic(self.alg.actor, self.alg.critic, by_group)
         self.logger = TrainingLogger(
             log_dir=str(log_dir) if log_dir else None,
             cfg=self.cfg,
@@ -166,6 +168,8 @@ class MuteRunner(OnPolicyRunner):
         # to where they are, and the random states stay where they belong.
         checkpoint = load_checkpoint(Path(path), map_location or "cpu")
         try:
+            if self.task_cfg.agent.symmetric and not checkpoint["config"]["agent"]["symmetric"]:
+                raise ValueError("agent.symmetric is true, and its networks were trained without")
             own = _part_of_rank(checkpoint, self.ranks)
             checkpoint["estimator_trainer"]["past"] = {} if own is None else own["estimator_past"]
             self.alg.load(checkpoint, load_cfg, strict)

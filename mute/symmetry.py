@@ -1,7 +1,8 @@
 """The mirror image of what the networks see and say: left becomes right.
 
-The robot's two sides are alike but for a few millimetres of its centre of mass, and so are the
-commands. A network that knows that needs half as many robots to find out what one command takes.
+The robot's two sides are nearly alike (centres of mass lie millimetres off), and so are the
+commands: a network that knows that learns from one turn what the other takes. Its mean action
+cannot choose a side where nothing that it sees does; the robot's bias and its past do that.
 """
 
 from __future__ import annotations
@@ -15,7 +16,16 @@ from mute.storage import PreparedModel
 from networks.estimator import Estimator
 from networks.reflection import Reflection
 
-__all__ = ["FEET", "JOINTS", "OBSERVATION", "POLAR", "groups", "heights", "tie_networks"]
+__all__ = [
+    "FEET",
+    "JOINTS",
+    "OBSERVATION",
+    "POLAR",
+    "groups",
+    "heights",
+    "tie_actor_critic",
+    "tie_estimator",
+]
 
 
 def _each_leg(*sign: float) -> Reflection:
@@ -59,7 +69,9 @@ def heights(grid: torch.Tensor) -> Reflection:
     Args:
         grid: Points in the heading frame, m. Shape: (num_heights, 2).
     """
-    distances = torch.cdist(grid * grid.new_tensor((1.0, -1.0)), grid)
+    mirrored = grid * grid.new_tensor((1.0, -1.0))
+    # Not `cdist`, which may multiply in bfloat16 where a run allows that.
+    distances = (mirrored[:, None] - grid).abs().sum(dim=2)
     return Reflection(tuple(distances.argmin(dim=1).tolist()), (1.0,) * len(grid))
 
 
@@ -80,26 +92,27 @@ def groups(env: QuadrupedEnv, latent_dim: int, with_phase: bool) -> dict[str, Re
     }
 
 
-def tie_networks(
-    env: QuadrupedEnv,
-    estimator: Estimator,
-    actor: PreparedModel,
-    critic: PreparedModel,
-    with_phase: bool,
-) -> None:
-    """Make all networks treat left and right alike, now and as they learn.
-
-    Args:
-        env: The environment that they are for.
-        estimator: The estimator.
-        actor: The actor, on the groups that it was made with.
-        critic: The critic, likewise.
-        with_phase: Whether the group `estimate` holds the phase.
+def tie_estimator(env: QuadrupedEnv, estimator: Estimator) -> None:
+    """Make the estimator of an environment treat left and right alike, now and as it learns.
 
     Raises:
         ValueError: If the width of a layer is odd.
     """
     estimator.tie(OBSERVATION, POLAR, heights(env.grid), FEET)
-    by_group = groups(env, estimator.cfg.latent_dim, with_phase)
+
+
+def tie_actor_critic(
+    actor: PreparedModel, critic: PreparedModel, by_group: dict[str, Reflection]
+) -> None:
+    """Make actor and critic treat left and right alike, now and as they learn.
+
+    Args:
+        actor: The actor.
+        critic: The critic.
+        by_group: Reflection of each group that they see, from `groups`.
+
+    Raises:
+        ValueError: If the width of a layer is odd.
+    """
     for model, target in ((actor, JOINTS), (critic, Reflection.unchanged(1))):
         model.tie(Reflection.joined([by_group[name] for name in model.obs_groups]), target)

@@ -3,8 +3,9 @@
 A reflection acts on a vector by permuting its entries and changing the signs of some. A layer W, b
 commutes with the reflections P of its input and Q of its output if Q W P = W and Q b = b. Weights
 that start so and learn from the mean of their gradient and its mirror image stay so under Adam,
-which treats all entries alike. Nothing else changes: the layers, what is saved of them and what
-they cost are those of ordinary ones. Hidden layers are mirrored by swapping their halves.
+which treats all entries alike, up to rounding. Nothing else changes: the layers, what is saved of
+them and what they cost in use are those of ordinary ones; learning pays one more gather for each
+gradient. Hidden layers are mirrored by swapping their halves.
 
 Sources: Ordonez-Apraez et al., "Morphological symmetries in robotics", 2024 (equivariant layers);
 Su et al., "Leveraging symmetry in RL-based legged locomotion control", 2024 (what they are worth).
@@ -89,7 +90,8 @@ def tie_layer(weight: Tensor, source: Reflection, target: Reflection) -> None:
     """
     place = torch.tensor(target.index)[:, None], torch.tensor(source.index)
     sign = torch.tensor(target.sign)[:, None] * torch.tensor(source.sign)
-    # Half the sum of two independent entries would start with half of the usual variance.
+    # Half the sum of two independent entries would start with half of the usual variance. No entry
+    # is its own image, since hidden layers swap their halves, and one side is always hidden.
     _tie(weight, place, sign, math.sqrt(0.5))
 
 

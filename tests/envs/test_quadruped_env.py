@@ -444,13 +444,19 @@ def test_without_a_ramp_quiet_is_full_from_the_start():
 
 def test_the_guide_leaves_the_reward_with_the_simulated_time():
     rewards = RewardsCfg(guide_ramp=(0.04, 0.12), diagonal_support=1.0)
-    env = _make_env(1, rewards=rewards)
-    guide = [env.guide]
+    env = _make_env(1, rewards=rewards, **CALM)
+    env.set_command(torch.tensor([0.5, 0.0, 0.0, 0.0]))
+    hips_out = torch.zeros(1, 12)
+    hips_out[0, [1, 2, 10, 11]] = torch.tensor([4.0, -4.0, 4.0, -4.0])  # FR and RL drawn up
+    guide, shares = [env.guide], []
     for _ in range(7):
-        log = _stand_still(env)[3]["log"]
+        log = env.step(hips_out)[3]["log"]
         guide.append(env.guide)
+        shares.append(log["Reward/diagonal_support"].item())
         assert log["Curriculum/guide"].item() == pytest.approx(env.guide)
     assert guide == pytest.approx([1.0, 1.0, 1.0, 0.75, 0.5, 0.25, 0.0, 0.0])
+    assert shares[3] > 0.1
+    assert shares[-1] == 0.0
 
 
 def test_without_a_ramp_there_is_no_guide():

@@ -142,7 +142,7 @@ def _make_motion(**given):
 def _make_cfg(**given):
     """Make a configuration whose weights are 0, but for those given."""
     weights: dict[str, Any] = dict.fromkeys(TERMS, 0.0)
-    return RewardsCfg(**(weights | given))
+    return RewardsCfg(**(weights | {"guide_ramp": (0.0, 1.0)} | given))
 
 
 def _make_sum(cfg):
@@ -272,6 +272,7 @@ def test_a_reward_is_not_changed_by_the_next_call():
         ("quiet_ramp", (-1.0, 1.0)),
         ("lift_ramp", (2.0, 1.0)),
         ("guide_ramp", (2.0, 1.0)),
+        ("diagonal_support", 0.7),
         ("desired_height", 0.0),
         ("clearance_target", -0.1),
         ("apex_target", 0.0),

@@ -50,6 +50,11 @@ def test_the_benchmark_prints_the_rates_of_every_part_as_json(capsys):
     }
 
 
+def test_a_part_is_compared_with_the_engine_turn_by_turn():
+    # Turns say 1/2, 1/6 and 1/2; the medians of the times, 1 and 6, would say 1/6.
+    assert benchmark._median_ratio([1.0, 1.0, 3.0], [2.0, 6.0, 6.0]) == 0.5
+
+
 @pytest.mark.parametrize(
     ("arguments", "names"),
     [

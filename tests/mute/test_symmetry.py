@@ -6,14 +6,14 @@ import dataclasses
 
 import pytest
 import torch
-from learning_helpers import make_cfg
+from learning_helpers import differences, everything, make_cfg
 from tensordict import TensorDict
 
 from envs.observations import OBS_DIM, ObservationsCfg
 from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
 from envs.randomization import RandomizationCfg
 from envs.terrain import HeightMapCfg
-from mute.checkpoint import load_checkpoint
+from mute.checkpoint import CheckpointError
 from mute.config import AgentCfg
 from mute.estimated_env import estimate_group
 from mute.runner import MuteRunner
@@ -70,11 +70,37 @@ def test_a_mirrored_robot_sees_the_mirror_image():
         assert (robot - mirrored)[shown].abs().max() > 0.2
 
 
-@pytest.mark.parametrize("width", [0.6, 0.45])
-def test_a_height_is_mirrored_to_the_point_on_the_other_side(width):
-    grid = HeightMapCfg(length=0.6, width=width).grid()
-    mirrored = grid[list(heights(grid).index)]
+@pytest.mark.parametrize(
+    "cfg", [HeightMapCfg(), HeightMapCfg(1.0, 0.45), HeightMapCfg(spacing=0.03)]
+)
+def test_a_height_is_mirrored_to_the_point_on_the_other_side(cfg):
+    precision = torch.get_float32_matmul_precision()
+    torch.set_float32_matmul_precision("medium")
+    try:
+        grid = cfg.grid()
+        mirrored = grid[list(heights(grid).index)]
+    finally:
+        torch.set_float32_matmul_precision(precision)
     torch.testing.assert_close(mirrored, grid * torch.tensor([1.0, -1.0]))
+
+
+def test_the_critics_physics_are_mirrored_by_the_side_of_the_centre_of_mass():
+    env = QuadrupedEnv(QuadrupedEnvCfg(num_envs=3))
+    physics = groups(env, latent_dim=2, with_phase=True)["privileged"](
+        env.get_observations()["privileged"]
+    )[:, env.privileged_slices["physics"]]
+    # Friction, added mass, and where the centre of mass lies along x, y, z.
+    torch.testing.assert_close(physics, env.physics * torch.tensor([1.0, 1.0, 1.0, -1.0, 1.0]))
+
+
+def test_a_centre_of_mass_that_lies_more_on_one_side_is_refused():
+    cfg = make_cfg()
+    lopsided = RandomizationCfg(com_offset=(0.0, 0.02))
+    env = dataclasses.replace(cfg.env, randomization=lopsided)
+    dataclasses.replace(cfg, env=env)
+    agent = dataclasses.replace(cfg.agent, symmetric=True)
+    with pytest.raises(ValueError, match=r"com_offset must be \(-x, x\) for agent.symmetric"):
+        dataclasses.replace(cfg, env=env, agent=agent)
 
 
 def test_all_networks_commute_with_the_mirror_after_learning(runner):
@@ -132,18 +158,27 @@ def test_both_sides_explore_alike(runner):
     assert deviation.std() > 0.0
 
 
-def test_a_symmetric_run_resumes_bit_for_bit(runner, tmp_path):
+def test_a_symmetric_run_resumes_bit_for_bit(tmp_path):
     whole = _make_symmetric_runner(tmp_path / "whole")
     assert whole.train()
     resumed = _make_symmetric_runner(tmp_path / "resumed")
     resumed.load(str(tmp_path / "whole" / "model_1.pt"))
     assert resumed.train()
-    name = "actor_state_dict"
-    one, other = (
-        load_checkpoint(tmp_path / directory / "model_2.pt")[name]
-        for directory in ("whole", "resumed")
-    )
-    assert all(torch.equal(value, other[key]) for key, value in one.items())
+    assert differences(everything(resumed), everything(whole)) == []
+
+
+def test_what_was_trained_without_is_not_made_symmetric_by_resuming(tmp_path):
+    free = MuteRunner("go1_mute", make_cfg(1), tmp_path)
+    assert free.train()
+    with pytest.raises(CheckpointError, match=r"agent\.symmetric is true, and its networks"):
+        _make_symmetric_runner().load(str(tmp_path / "model_0.pt"))
+
+
+def test_the_first_rollout_of_a_symmetric_run_reproduces_its_estimates():
+    runner = _make_symmetric_runner(iterations=1)
+    estimator, first = runner.env.estimator, runner.env.get_observations()
+    estimate, _ = estimator.step(first["policy"], runner.env.state_before)
+    assert torch.equal(estimate_group(estimate, estimator, with_phase=True), first["estimate"])
 
 
 @pytest.mark.parametrize(
