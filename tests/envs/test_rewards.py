@@ -142,7 +142,8 @@ def _make_motion(**given):
 def _make_cfg(**given):
     """Make a configuration whose weights are 0, but for those given."""
     weights: dict[str, Any] = dict.fromkeys(TERMS, 0.0)
-    return RewardsCfg(**(weights | {"guide_ramp": (0.0, 1.0)} | given))
+    weights["guide_ramp"] = (0.0, 1.0)
+    return RewardsCfg(**(weights | given))
 
 
 def _make_sum(cfg):
