@@ -169,7 +169,8 @@ def test_two_ranks_learn_from_halves_what_one_process_learns_from_the_whole(one_
         for expected, actual in zip(one_process["learnt"], seen["shared"], strict=True):
             assert expected.keys() == actual.keys()
             for name, value in expected.items():
-                scale = max(float(value.abs().max()), 1e-6)
+                # What began at 0 has moved by some steps of Adam, 1e-3 each, or by less.
+                scale = max(float(value.abs().max()), 1e-3)
                 error = float((actual[name] - value).abs().max())
                 assert error <= 1e-3 * scale, name
     assert any(name.startswith("estimator.") for name in one_process["learnt"][1])
@@ -242,7 +243,9 @@ def test_one_rank_goes_on_with_what_two_have_learnt(interrupted, continued):
     steps = [c["logger"]["total_steps"] for c in (before, after)]
     assert steps[1] - steps[0] == 2 * 6 * 4
     optimiser = after["optimizer_state_dict"]["state"][0]["step"]
-    assert int(optimiser) == 20 * (last + 1)
+    ppo = after["config"]["agent"]["ppo"]
+    updates = ppo["num_learning_epochs"] * ppo["num_mini_batches"]
+    assert int(optimiser) == updates * (last + 1)
 
 
 def test_two_ranks_go_on_with_one_and_miss_one_that_is_killed(continued):
