@@ -172,6 +172,11 @@ class RewardsCfg:
                 raise ValueError(f"rewards.{name} must be > 0, got {getattr(self, name)}")
 
 
+def _asked_to_move(motion: Motion) -> torch.Tensor:
+    """Return which robots have a command other than to stand. Shape: (num_envs,)."""
+    return (motion.command[:, :3] != 0.0).any(dim=1)
+
+
 def lin_vel_tracking(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
     """Reward the commanded horizontal velocity."""
     error = (motion.command[:, :2] - motion.base_lin_vel[:, :2]).square().sum(dim=1)
@@ -262,9 +267,8 @@ def foot_clearance(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
 
 def touchdown_apex(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
     """Penalise, at landing, a swing that stayed below its target."""
-    moving = (motion.command[:, :3] != 0.0).any(dim=1)
     missing = (1.0 - motion.swing_apex / cfg.apex_target).clamp(min=0.0)
-    return (missing * motion.touchdown).sum(dim=1) * moving
+    return (missing * motion.touchdown).sum(dim=1) * _asked_to_move(motion)
 
 
 def foot_slip(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
@@ -274,7 +278,7 @@ def foot_slip(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
 
 def stand_still(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
     """Penalise leaving the stance while asked to stand."""
-    standing = (motion.command[:, :3] == 0.0).all(dim=1)
+    standing = ~_asked_to_move(motion)
     return motion.joint_pos.abs().sum(dim=1) * standing
 
 
@@ -298,10 +302,9 @@ def diagonal_support(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
     Two feet balance a robot for as long as it takes to tip over, so it has to step to earn that.
     One foot off the ground, or one on it, earns half.
     """
-    moving = (motion.command[:, :3] != 0.0).any(dim=1)
     front_right, front_left, rear_right, rear_left = motion.contact.float().unbind(dim=1)
     difference = front_right + rear_left - front_left - rear_right
-    return 0.5 * difference.abs() * moving
+    return 0.5 * difference.abs() * _asked_to_move(motion)
 
 
 Term = Callable[[Motion, RewardsCfg], torch.Tensor]

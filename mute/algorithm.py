@@ -59,7 +59,7 @@ class EstimatorPPO(PPO):
         """Sample actions, see `PPO.act`; remember the LSTM state that the rollout began with."""
         if self.storage.step == 0:
             self._rollout_state = self.env.state_before
-        use_learning_threads()  # whatever ran between two rollouts
+            use_learning_threads()  # whatever ran between two rollouts; the environment keeps them
         return super().act(obs)
 
     def compute_returns(self, obs: TensorDict) -> None:
