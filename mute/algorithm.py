@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import Any
 
 import torch
@@ -42,6 +43,9 @@ class EstimatorPPO(PPO):
         algorithm = PPO.construct_algorithm(obs, env, cfg, device)
         assert isinstance(algorithm, EstimatorPPO)  # what the configuration names
         models = [algorithm.actor, algorithm.critic]
+        parameters = chain(algorithm.actor.parameters(), algorithm.critic.parameters())
+        # One kernel for all parameters; rsl_rl's choice takes some twenty for each of them.
+        algorithm.optimizer = torch.optim.Adam(parameters, lr=algorithm.learning_rate, fused=True)
         storage = PreparedStorage("rl", env.num_envs, steps, obs, [env.num_actions], device)
         storage.models = [model for model in models if isinstance(model, PreparedModel)]
         algorithm.storage = storage

@@ -132,7 +132,7 @@ class EstimatorTrainer:
         """
         self.estimator = estimator
         self.cfg = cfg
-        self.optimizer = torch.optim.Adam(estimator.parameters(), lr=cfg.learning_rate)
+        self.optimizer = torch.optim.Adam(estimator.parameters(), cfg.learning_rate, fused=True)
         self._privileged = privileged
         self._min_steps, self._max_steps = min_steps, max_steps
         self._past: dict[str, Tensor] = {}

@@ -8,6 +8,7 @@ the normalisers learn only after the update. The batches are bit for bit those o
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
+from typing import Any
 
 import torch
 from rsl_rl.models import MLPModel
@@ -28,6 +29,17 @@ class PreparedModel(MLPModel):
 
     reflection: Reflection | None = None
     """How its input is mirrored, if it is tied."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401
+        """Build the networks, see `MLPModel`.
+
+        Activations work in place: nothing else reads what they are given, and ELU's gradient then
+        comes from its output, without a second exponential.
+        """
+        super().__init__(*args, **kwargs)
+        for layer in self.mlp:
+            if hasattr(layer, "inplace"):
+                layer.inplace = True  # pyright: ignore[reportAttributeAccessIssue]
 
     def tie(self, source: Reflection, target: Reflection) -> None:
         """Make it commute with the reflections of its input and output, now and as it learns.

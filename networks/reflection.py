@@ -116,11 +116,12 @@ def tie_mlp(layers: nn.Module, source: Reflection, target: Reflection) -> None:
 
 
 def _tie(parameter: Tensor, place: tuple[Tensor, ...], sign: Tensor, initial_scale: float) -> None:
-    device = parameter.device
-    place, sign = tuple(part.to(device) for part in place), sign.to(parameter)
+    # One index of entries in a row: a gather by two of them takes several times as long.
+    entries = torch.arange(parameter.numel()).view(parameter.shape)[place].flatten()
+    entries, sign = entries.to(parameter.device), sign.to(parameter)
 
     def mirrored(value: Tensor) -> Tensor:
-        return sign * value[place]
+        return sign * value.reshape(-1).index_select(0, entries).view(value.shape)
 
     with torch.no_grad():
         parameter.copy_(initial_scale * (parameter + mirrored(parameter)))
