@@ -15,6 +15,7 @@ from rsl_rl.models import MLPModel
 from rsl_rl.modules import HiddenState
 from rsl_rl.storage import RolloutStorage
 from tensordict import TensorDict
+from torch import nn
 
 from networks.reflection import Reflection, tie_mlp, tie_vector
 
@@ -38,8 +39,8 @@ class PreparedModel(MLPModel):
         """
         super().__init__(*args, **kwargs)
         for layer in self.mlp:
-            if hasattr(layer, "inplace"):
-                layer.inplace = True  # pyright: ignore[reportAttributeAccessIssue]
+            if isinstance(layer, nn.ELU | nn.ReLU | nn.SELU):
+                layer.inplace = True
 
     def tie(self, source: Reflection, target: Reflection) -> None:
         """Make it commute with the reflections of its input and output, now and as it learns.
