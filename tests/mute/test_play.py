@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import re
@@ -236,7 +237,10 @@ def test_a_walk_stopped_at_once_leaves_no_sound_and_says_so(policy, tmp_path, mo
 
 
 def test_every_command_within_the_limits_passes_the_check():
-    PlayArgs(beta=1.0, vx=-2.0, vy=1.0, wz=2.0, seconds=0.02, num_envs=1).check()
+    args = PlayArgs(beta=1.0, vx=-2.0, vy=1.0, wz=2.0, seconds=0.02, num_envs=1)
+    args.check()
+    with pytest.raises(MuteError, match="--vx must be"):
+        dataclasses.replace(args, vx=-2.01).check()
 
 
 def test_a_new_command_is_observed_and_measured_from_the_next_step_on():

@@ -1,0 +1,38 @@
+"""The networks that rsl_rl's PPO learns are rsl_rl's, whatever they save on the way."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from rsl_rl.models import MLPModel
+from tensordict import TensorDict
+
+from mute.storage import PreparedModel
+
+
+@pytest.mark.parametrize("activation", ["elu", "relu", "selu", "tanh"])
+def test_activations_in_place_change_neither_outputs_nor_gradients(activation):
+    generator = torch.Generator().manual_seed(0)
+    obs = TensorDict({"policy": torch.randn(64, 10, generator=generator)}, batch_size=64)
+    groups = {"actor": ["policy"]}
+    sizes = {"output_dim": 3, "hidden_dims": (16, 8), "activation": activation}
+    plain = MLPModel(obs, groups, "actor", **sizes)
+    ours = PreparedModel(obs, groups, "actor", **sizes)
+    ours.load_state_dict(plain.state_dict())
+    before = obs["policy"].clone()
+    outputs = [model(obs) for model in (plain, ours)]
+    assert torch.equal(*outputs)
+    for output in outputs:
+        output.square().sum().backward()
+    for expected, parameter in zip(plain.parameters(), ours.parameters(), strict=True):
+        assert parameter.grad is not None and expected.grad is not None
+        assert torch.allclose(parameter.grad, expected.grad, rtol=1e-5, atol=1e-6)
+    assert torch.equal(obs["policy"], before)
+
+
+def test_no_activation_keeps_its_input():
+    obs = TensorDict({"policy": torch.randn(4, 10)}, batch_size=4)
+    model = PreparedModel(obs, {"actor": ["policy"]}, "actor", 3, (16, 8), "elu")
+    activations = [layer for layer in model.mlp if isinstance(layer, torch.nn.ELU)]
+    assert len(activations) == 2
+    assert all(layer.inplace for layer in activations)
