@@ -54,8 +54,8 @@ def _go1_mute() -> TaskCfg:
     commands = CommandsCfg(initial_share=0.5, ramp=(8.0, 44.0))
     agent = AgentCfg(
         iterations=401,
-        actor_hidden=(128, 64, 32),
-        critic_hidden=(128, 64, 32),
+        actor_hidden=(128, 128, 64),
+        critic_hidden=(128, 128, 64),
         symmetric=True,
         # With 1.0 the robot got about on the shaking of its legs, and the policy, which is the mean
         # action, did not walk; with 0.5 it did not leave the stance (seed 1, without the guide).
