@@ -175,7 +175,7 @@ class AgentCfg:
             "obs_normalization": True,
         }
         distribution = {
-            "class_name": "GaussianDistribution",
+            "class_name": "mute.distribution:SharedGaussian",
             "init_std": self.init_std,
             "std_range": self.std_range,
         }
