@@ -13,6 +13,7 @@ from tensordict import TensorDict
 from mute.distributed import Ranks
 from mute.estimated_env import EstimatedEnv
 from mute.estimation import EstimatorTrainer
+from mute.optimizer import FusedAdam
 from mute.storage import PreparedModel, PreparedStorage
 from mute.threads import use_learning_threads
 from networks.estimator import State
@@ -44,8 +45,7 @@ class EstimatorPPO(PPO):
         assert isinstance(algorithm, EstimatorPPO)  # what the configuration names
         models = [algorithm.actor, algorithm.critic]
         parameters = chain(algorithm.actor.parameters(), algorithm.critic.parameters())
-        # One kernel for all parameters; rsl_rl's choice takes some twenty for each of them.
-        algorithm.optimizer = torch.optim.Adam(parameters, lr=algorithm.learning_rate, fused=True)
+        algorithm.optimizer = FusedAdam(parameters, algorithm.learning_rate)
         storage = PreparedStorage("rl", env.num_envs, steps, obs, [env.num_actions], device)
         storage.models = [model for model in models if isinstance(model, PreparedModel)]
         algorithm.storage = storage

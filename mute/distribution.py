@@ -22,22 +22,31 @@ class SharedGaussian(GaussianDistribution):
     Shapes: mean and outputs (num_samples, output_dim); what is summed over a sample (num_samples,).
     """
 
+    def __init__(
+        self,
+        output_dim: int,
+        init_std: float = 1.0,
+        std_range: tuple[float, float] = (1e-6, 1e6),
+    ) -> None:
+        """Start with one deviation for all outputs, see `GaussianDistribution`."""
+        super().__init__(output_dim, init_std, std_range)
+
     def update(self, mlp_output: torch.Tensor) -> None:
         """Take on the means of a batch, see `GaussianDistribution.update`."""
         super().update(mlp_output)
-        self._row = self.std[:1]
-        """Deviations. Shape: (1, output_dim)."""
+        self._row = self.std_param.clamp(*self.std_range)
+        """Deviations. Shape: (output_dim,)."""
 
     @property
     def entropy(self) -> torch.Tensor:
         """Entropy of each sample."""
         each = self._row.log() + (0.5 + _LOG_ROOT_TWO_PI)
-        return each.sum(dim=-1).expand(self.mean.shape[0])
+        return each.sum().expand(self.mean.shape[:-1])
 
     def log_prob(self, outputs: torch.Tensor) -> torch.Tensor:
         """Return the log-probability of each sample."""
         squares = ((outputs - self.mean) / self._row).square().sum(dim=-1)
-        return -0.5 * squares - (self._row.log() + _LOG_ROOT_TWO_PI).sum(dim=-1)
+        return -0.5 * squares - (self._row.log() + _LOG_ROOT_TWO_PI).sum()
 
     def kl_divergence(
         self, old_params: tuple[torch.Tensor, ...], new_params: tuple[torch.Tensor, ...]

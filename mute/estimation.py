@@ -17,6 +17,7 @@ from envs.phase import hindsight_phase
 from envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE
 from mute.config import EstimationCfg
 from mute.distributed import Ranks
+from mute.optimizer import FusedAdam
 from networks.estimator import Estimate, Estimator, State
 
 __all__ = ["EstimatorTrainer", "Labels", "Losses", "estimator_losses"]
@@ -132,7 +133,7 @@ class EstimatorTrainer:
         """
         self.estimator = estimator
         self.cfg = cfg
-        self.optimizer = torch.optim.Adam(estimator.parameters(), cfg.learning_rate, fused=True)
+        self.optimizer = FusedAdam(estimator.parameters(), cfg.learning_rate)
         self._privileged = privileged
         self._min_steps, self._max_steps = min_steps, max_steps
         self._past: dict[str, Tensor] = {}

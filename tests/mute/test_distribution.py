@@ -19,7 +19,7 @@ def _both() -> list[GaussianDistribution]:
 
 def test_probability_entropy_and_divergence_are_those_of_rsl_rl_and_so_are_their_gradients():
     means, actions = torch.randn(50, 12), torch.randn(50, 12)
-    old = (means + 0.1 * torch.randn(50, 12), torch.full((50, 12), 0.3))
+    old = (means + 0.1 * torch.randn(50, 12), torch.linspace(0.1, 0.5, 12).expand(50, 12))
     results = []
     for distribution in _both():
         mean = means.clone().requires_grad_()

@@ -72,7 +72,7 @@ def test_a_tied_perceptron_commutes_with_the_reflections():
 
 def test_it_goes_on_commuting_as_it_learns_what_does_not():
     mlp = _make_mlp()
-    optimizer = torch.optim.Adam(mlp.parameters(), lr=0.01)
+    optimizer = torch.optim.Adam(mlp.parameters(), lr=0.01, fused=True)
     x, y = torch.randn(200, 4), torch.randn(200, 3)
     losses = []
     for _ in range(100):
