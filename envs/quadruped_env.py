@@ -32,9 +32,8 @@ from envs.scene import (
     STAND_JOINT_POS,
     SceneCfg,
     build_scene,
-    sensor_history,
-    sensor_slice,
 )
+from envs.sensors import sensor_history, sensor_slice
 from envs.simulation import Engine, make_simulation
 from envs.terrain import FlatTerrain, HeightMapCfg, height_map
 

@@ -2,18 +2,19 @@
 
 The robot itself is `resources/go1/go1.xml`. This module adds what surrounds it: the floor, the
 light and the sky, the sensors that the environment reads, and the solver's options. Stepping the
-model is left to `envs.simulation`.
+model is left to `envs.simulation`, finding what the sensors read to `envs.sensors`.
 """
 
 from __future__ import annotations
 
-import importlib
 import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 import mujoco
+
+from envs.menagerie import dress_in_menagerie
 
 LEGS: tuple[str, ...] = ("FR", "FL", "RR", "RL")
 """The legs, in the order of every per-leg array."""
@@ -43,9 +44,6 @@ Look = Literal["primitives", "menagerie"]
 Integrator = Literal["euler", "implicit", "implicitfast"]
 Cone = Literal["pyramidal", "elliptic"]
 Solver = Literal["newton", "cg"]
-
-_VISUAL_GROUP = 2
-"""Geom group of shapes only looked at; collision shapes are in group 3, hidden by default."""
 
 _PATCH_THICKNESS = 0.1
 """Thickness of a patch of floor, in m; its top is level."""
@@ -94,10 +92,6 @@ class FloorPatch:
             raise ValueError(f"a patch needs low < high in x and y, got {self.low} and {self.high}")
         _require_number("friction", self.friction, low=0.0, high=10.0)
         _require_solref("solref", self.solref)
-
-
-class SceneError(RuntimeError):
-    """Raised where a scene needs something that this machine does not have."""
 
 
 @dataclass(frozen=True)
@@ -192,54 +186,8 @@ def make_spec(cfg: SceneCfg, foot_samples: int = 0) -> mujoco.MjSpec:
     if cfg.foot_forces:
         _add_force_sensors(spec)
     if cfg.look == "menagerie":
-        _dress_in_menagerie(spec)
+        dress_in_menagerie(spec)
     return spec
-
-
-def sensor_slice(model: mujoco.MjModel, first_name: str, count: int) -> slice:
-    """Return the columns of `sensordata` that `count` sensors fill, from `first_name` on.
-
-    Raises:
-        ValueError: There is no such sensor, there are fewer than `count` from it on, or they are
-            not of one kind and size, so that the columns would mix quantities.
-    """
-    first = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, first_name)
-    if first < 0:
-        raise ValueError(f"first_name is {first_name!r}: the model has no such sensor")
-    if not 1 <= count <= model.nsensor - first:
-        raise ValueError(
-            f"count is {count}: from {first_name!r} on the model has {model.nsensor - first}"
-            " sensors, and at least 1 is needed"
-        )
-    kinds = {
-        (int(model.sensor_type[i]), int(model.sensor_dim[i])) for i in range(first, first + count)
-    }
-    if len(kinds) != 1:
-        names = [model.sensor(i).name for i in range(first, first + count)]
-        raise ValueError(f"the {count} sensors from {first_name!r} on are not contiguous: {names}")
-    start = int(model.sensor_adr[first])
-    return slice(start, start + count * int(model.sensor_dim[first]))
-
-
-def sensor_history(model: mujoco.MjModel, first_name: str, count: int) -> tuple[slice, int, int]:
-    """Return where `count` sensors, from `first_name` on, keep their past readings.
-
-    Each keeps a row of two numbers of MuJoCo's own, a time for every sample, and the samples.
-
-    Returns:
-        The columns of `history` that all rows fill, the samples and the dimension of a sensor.
-
-    Raises:
-        ValueError: There are no such sensors, or they keep nothing.
-    """
-    dim = sensor_slice(model, first_name, count)  # checks that the sensors are there and of a kind
-    size = (dim.stop - dim.start) // count
-    first = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, first_name)
-    samples = int(model.sensor_history[first, 0])
-    if samples < 1:
-        raise ValueError(f"first_name is {first_name!r}: the sensor keeps no past readings")
-    start = int(model.sensor_historyadr[first])
-    return slice(start, start + count * (2 + samples * (1 + size))), samples, size
 
 
 def _require_number(
@@ -418,54 +366,3 @@ def _add_force_sensors(spec: mujoco.MjSpec) -> None:
             objtype=mujoco.mjtObj.mjOBJ_SITE,
             objname=f"{leg}_foot",
         )
-
-
-def _dress_in_menagerie(spec: mujoco.MjSpec) -> None:
-    """Show the meshes of the `mujoco_menagerie` package's Go1 in place of our primitives."""
-    source = _load_menagerie_go1()
-    mesh_dir = Path(source.modelfiledir) / source.meshdir
-    for geom in [geom for geom in spec.geoms if geom.group == _VISUAL_GROUP]:
-        spec.delete(geom)
-    for mesh in source.meshes:
-        name = mesh.name or Path(mesh.file).stem  # a mesh without a name goes by its file's
-        spec.add_mesh(name=f"menagerie_{name}", file=str(mesh_dir / mesh.file), scale=mesh.scale)
-    for material in source.materials:
-        spec.add_material(
-            name=f"menagerie_{material.name}",
-            rgba=material.rgba,
-            specular=material.specular,
-            shininess=material.shininess,
-        )
-    for geom in source.geoms:
-        body = spec.body(geom.parent.name)
-        if geom.type != mujoco.mjtGeom.mjGEOM_MESH or body is None:
-            continue
-        body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname=f"menagerie_{geom.meshname}",
-            material=f"menagerie_{geom.material}" if geom.material else "silver",
-            pos=geom.pos,
-            quat=geom.quat,
-            group=_VISUAL_GROUP,
-            contype=0,
-            conaffinity=0,
-            mass=0.0,
-        )
-
-
-def _load_menagerie_go1() -> mujoco.MjSpec:
-    """Return MuJoCo Menagerie's Go1, which its package fetches into a cache on first use."""
-    try:
-        menagerie: Any = importlib.import_module("mujoco_menagerie")
-    except ImportError as error:
-        raise SceneError(
-            "look 'menagerie' needs the package mujoco_menagerie: pip install mujoco_menagerie,"
-            " or use look 'primitives'"
-        ) from error
-    try:
-        return menagerie.get("unitree_go1").spec("go1")
-    except (menagerie.MenagerieError, OSError, ValueError) as error:
-        raise SceneError(
-            "look 'menagerie' found no Go1 in the cache of mujoco_menagerie and could not fetch it"
-            f" ({error}): fetch it once where there is a network, or use look 'primitives'"
-        ) from error

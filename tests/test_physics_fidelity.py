@@ -11,7 +11,8 @@ import pytest
 import torch
 
 from envs.quadruped_env import QuadrupedEnv
-from envs.scene import LEGS, sensor_slice
+from envs.scene import LEGS
+from envs.sensors import sensor_slice
 from mute.command_lines.arguments import REPOSITORY
 from mute.controllers import LearnedController, load_policy
 from mute.evaluation.trials import evaluation_cfg, run_trial

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from envs.quadruped_env import QuadrupedEnv
-from envs.scene import FOOT_RADIUS, LEGS, sensor_slice
+from envs.scene import FOOT_RADIUS, LEGS
+from envs.sensors import sensor_slice
 from mute.acoustics.contacts import ContactBlock, Impacts
 
 __all__ = ["Recorder", "effective_mass"]

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from envs.menagerie import SceneError
 from envs.quadruped_env import QuadrupedEnv
-from envs.scene import Look, SceneError
+from envs.scene import Look
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
 from mute.acoustics.soundscape import SOURCES

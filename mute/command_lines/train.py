@@ -14,8 +14,8 @@ from typing import Any
 import torch
 import yaml
 
+from envs.menagerie import SceneError
 from envs.quadruped_env import QuadrupedEnvCfg
-from envs.scene import SceneError
 from mute.checkpoint import (
     CheckpointError,
     latest_checkpoint,

@@ -12,7 +12,8 @@ from envs.observations import OBSERVATION_WIDTHS, ObservationsCfg, slices
 from envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE, QuadrupedEnv, QuadrupedEnvCfg
 from envs.randomization import RandomizationCfg
 from envs.rewards import TERMS, RewardsCfg
-from envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS, sensor_slice
+from envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS
+from envs.sensors import sensor_slice
 
 POLICY = slices(OBSERVATION_WIDTHS)
 QUIET = {"observations": ObservationsCfg(noise_level=0.0)}

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
-from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -18,11 +16,9 @@ from envs.scene import (
     STAND_JOINT_POS,
     FloorPatch,
     SceneCfg,
-    SceneError,
     build_scene,
-    make_spec,
-    sensor_slice,
 )
+from envs.sensors import sensor_slice
 
 HIP_INERTIA = (0.000734064, 0.000468438, 0.000398719)
 THIGH_INERTIA = (0.00478717, 0.00460903, 0.000709268)
@@ -386,30 +382,6 @@ def test_sensors_come_in_the_promised_order(model):
     ]
 
 
-def test_sensor_slice_names_the_columns(model):
-    assert sensor_slice(model, "FR_foot_pos", 4) == slice(0, 12)
-    assert sensor_slice(model, "RR_foot_vel", 2) == slice(18, 24)
-    assert sensor_slice(model, "trunk_contact", 1) == slice(28, 29)
-
-
-@pytest.mark.parametrize("count", [0, -1, 27])
-def test_sensor_slice_refuses_a_count_that_the_model_cannot_fill(model, count):
-    with pytest.raises(ValueError, match=f"count is {count}"):
-        sensor_slice(model, "FR_foot_pos", count)
-
-
-def test_sensor_slice_refuses_an_unknown_sensor(model):
-    with pytest.raises(ValueError, match="no such sensor"):
-        sensor_slice(model, "FR_toe_pos", 4)
-
-
-def test_sensor_slice_refuses_sensors_of_another_kind_in_between():
-    spec = make_spec(SceneCfg())
-    spec.delete(spec.sensor("RL_foot_pos"))  # the fourth from FR_foot_pos on is now a velocity
-    with pytest.raises(ValueError, match="not contiguous"):
-        sensor_slice(spec.compile(), "FR_foot_pos", 4)
-
-
 # The scene's configuration.
 
 
@@ -487,54 +459,3 @@ def test_a_patch_stiffer_than_the_physics_steps_allow_is_refused_by_its_index():
     SceneCfg(timestep=0.004, floor_patches=(soft, hard))
     with pytest.raises(ValueError, match=r"floor_patches\[1\]\.solref\[0\] .* at least 0\.01"):
         SceneCfg(timestep=0.005, floor_patches=(soft, hard))
-
-
-# Menagerie's meshes.
-
-
-def test_without_the_menagerie_package_the_error_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "mujoco_menagerie", None)
-    with pytest.raises(SceneError, match="pip install mujoco_menagerie"):
-        build_scene(SceneCfg(look="menagerie"))
-
-
-def test_a_menagerie_without_its_files_is_one_clear_error(monkeypatch):
-    class MenagerieError(Exception):
-        pass
-
-    def get(name: str) -> None:
-        raise MenagerieError(f"cannot download {name}")
-
-    package = SimpleNamespace(get=get, MenagerieError=MenagerieError)
-    monkeypatch.setitem(sys.modules, "mujoco_menagerie", package)
-    with pytest.raises(SceneError, match="cannot download unitree_go1"):
-        build_scene(SceneCfg(look="menagerie"))
-
-
-def test_menagerie_meshes_take_the_place_of_our_primitives_and_leave_the_physics(
-    monkeypatch, tmp_path, model
-):
-    (tmp_path / "assets").mkdir()
-    (tmp_path / "assets" / "trunk.obj").write_text(
-        "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-    )
-    (tmp_path / "go1.xml").write_text(
-        '<mujoco><compiler meshdir="assets"/>'
-        '<asset><material name="paint" rgba="1 0 0 1"/><mesh file="trunk.obj"/></asset>'
-        '<worldbody><body name="trunk"><freejoint/>'
-        '<geom type="mesh" mesh="trunk" material="paint"/></body></worldbody></mujoco>'
-    )
-    robot = SimpleNamespace(
-        spec=lambda entry: mujoco.MjSpec.from_file(str(tmp_path / f"{entry}.xml"))
-    )
-    package = SimpleNamespace(get=lambda name: robot, MenagerieError=RuntimeError)
-    monkeypatch.setitem(sys.modules, "mujoco_menagerie", package)
-
-    dressed = build_scene(SceneCfg(look="menagerie"))
-    looks = np.flatnonzero(dressed.geom_group == 2)
-    assert len(looks) == 1
-    assert dressed.geom_type[looks[0]] == mujoco.mjtGeom.mjGEOM_MESH
-    assert dressed.body(dressed.geom_bodyid[looks[0]]).name == "trunk"
-    np.testing.assert_array_equal(dressed.mat_rgba[dressed.geom_matid[looks[0]]], (1, 0, 0, 1))
-    np.testing.assert_allclose(dressed.body_mass, model.body_mass)
-    np.testing.assert_allclose(dressed.body_inertia, model.body_inertia)

@@ -8,7 +8,8 @@ import math
 import pytest
 import torch
 
-from envs.scene import SceneCfg, build_scene, sensor_history, sensor_slice
+from envs.scene import SceneCfg, build_scene
+from envs.sensors import sensor_history, sensor_slice
 from envs.simulation import BatchSimulation, Engine, make_simulation
 
 MODEL = build_scene(SceneCfg())

@@ -17,7 +17,7 @@ import torch
 from learning_helpers import NUM_STEPS, differences, make_cfg, make_runner
 
 from envs.quadruped_env import QuadrupedEnv
-from envs.scene import sensor_history, sensor_slice
+from envs.sensors import sensor_history, sensor_slice
 from envs.warp_simulation import WarpSimulation
 from mute.checkpoint import CheckpointError
 from mute.controllers import LearnedController, load_policy

@@ -14,8 +14,8 @@ import torch
 import yaml
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from envs.menagerie import SceneError
 from envs.rewards import TERMS
-from envs.scene import SceneError
 from mute.checkpoint import load_checkpoint, save_checkpoint
 from mute.command_lines import train
 from mute.command_lines.train import main
