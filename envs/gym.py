@@ -12,20 +12,18 @@ from dataclasses import replace
 from typing import Any
 
 import gymnasium
-import mujoco
 import numpy as np
-import torch
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from envs.camera import Camera
+from envs.gym_robots import Robots
 from envs.observations import OBS_DIM
-from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnvCfg
 from envs.rewards import RewardsCfg
 
 __all__ = ["Go1Env", "Go1VectorEnv"]
-
-_OPTIONS = ("command", "beta")
 
 
 class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -62,13 +60,13 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
             ValueError: If the render mode is unknown or the reward asks for an estimated phase.
         """
         # One robot keeps one thread busy; more would only wait.
-        self._robots = _Robots(replace(_checked(cfg), num_envs=1, num_threads=1))
+        self._robots = Robots(replace(_checked(cfg), num_envs=1, num_threads=1))
         _check_render_mode(render_mode, self.metadata)
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": self._robots.render_fps}
         self.observation_space = _observation_space()
         self.action_space = _action_space(self._robots.cfg)
-        self._camera = _Camera(width, height)
+        self._camera = Camera(width, height)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -157,7 +155,7 @@ class Go1VectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             ValueError: If an argument is out of its range, or the reward asks for an estimated
                 phase.
         """
-        self._robots = _Robots(replace(_checked(cfg), num_envs=num_envs))
+        self._robots = Robots(replace(_checked(cfg), num_envs=num_envs))
         _check_render_mode(render_mode, self.metadata)
         self.num_envs = num_envs
         self.render_mode = render_mode
@@ -166,7 +164,7 @@ class Go1VectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self.single_action_space = _action_space(self._robots.cfg)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._camera = _Camera(width, height)
+        self._camera = Camera(width, height)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -235,115 +233,6 @@ class Go1VectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return ends
 
 
-class _Robots:
-    """What both environments share: a `QuadrupedEnv` in numpy, whose episodes others begin."""
-
-    def __init__(self, cfg: QuadrupedEnvCfg) -> None:
-        self.cfg = cfg
-        self._env: QuadrupedEnv | None = None
-        self._held = torch.zeros(cfg.num_envs, dtype=torch.bool)
-        self._held_command = torch.zeros(cfg.num_envs, 4)
-
-    @property
-    def exist(self) -> bool:
-        """Whether the robots were made."""
-        return self._env is not None
-
-    @property
-    def env(self) -> QuadrupedEnv:
-        if self._env is None:
-            raise gymnasium.error.ResetNeeded("call reset before step or render")
-        return self._env
-
-    @property
-    def render_fps(self) -> int:
-        return round(1.0 / self.cfg.step_dt)
-
-    def reset(self, seed: int | None, options: dict[str, Any] | None) -> None:
-        """Begin everywhere; with a seed, robots are made anew, as it decides their physics too."""
-        command, beta = _read_options(options or {}, self.cfg.num_envs)
-        if seed is None:
-            self.env.reset()
-        else:
-            self._env = QuadrupedEnv(replace(self.cfg, seed=seed))
-            self._env.autoreset = False
-        self._held.fill_(command is not None)
-        if command is None and beta is None:
-            return
-        target = self.env.commands.command.clone()
-        if command is not None:
-            target[:, :3] = command
-        if beta is not None:
-            target[:, 3] = beta
-        self._held_command = target
-        self.env.set_command(target)
-
-    def reset_finished(self, finished: np.ndarray) -> None:
-        """Begin the next episode of some robots; a held command ends with its episode."""
-        mask = torch.from_numpy(finished)
-        self._held &= ~mask
-        self.env.reset(mask)
-
-    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return rewards, terminated and truncated. Shapes: (num_envs,)."""
-        shape = (self.cfg.num_envs, NUM_ACTIONS)
-        if actions.shape != shape:
-            raise ValueError(f"actions must have shape {shape}, got {actions.shape}")
-        _, rewards, dones, extras = self.env.step(torch.as_tensor(actions, dtype=torch.float32))
-        self._hold_command()
-        time_outs = extras["time_outs"]
-        return rewards.numpy(), (dones & ~time_outs).numpy(), time_outs.numpy()
-
-    def observations(self) -> np.ndarray:
-        """Return what the robots see. Shape: (num_envs, OBS_DIM)."""
-        # No copy: the environment makes new tensors in every step and reset, here and below.
-        return self.env.get_observations()["policy"].numpy()
-
-    def infos(self) -> dict[str, np.ndarray]:
-        """Return what stands in `info`, with an axis of robots in front."""
-        return {
-            "privileged": self.env.get_observations()["privileged"].numpy(),
-            "landing_speed": self.env.footfalls.landing_speed.numpy(),
-        }
-
-    def _hold_command(self) -> None:
-        """Take back what the environment has drawn in place of a held command."""
-        if not bool(self._held.any()):
-            return
-        drawn = self.env.commands.command
-        wanted = torch.where(self._held.unsqueeze(1), self._held_command, drawn)
-        if not torch.equal(wanted, drawn):
-            self.env.set_command(wanted)
-
-
-class _Camera:
-    """Takes pictures from beside a robot; needs OpenGL from the first one on."""
-
-    def __init__(self, width: int, height: int) -> None:
-        self._size = (height, width)
-        self._renderer: mujoco.Renderer | None = None
-
-    def frame(self, env: QuadrupedEnv, index: int) -> np.ndarray:
-        """Return a picture of one robot, uint8. Shape: (height, width, 3)."""
-        data = mujoco.MjData(env.model)
-        data.qpos[:] = env.simulation.qpos[index].numpy()
-        mujoco.mj_forward(env.model, data)
-        camera = mujoco.MjvCamera()
-        camera.lookat[:] = data.qpos[:3]
-        camera.distance, camera.azimuth, camera.elevation = 1.5, 130.0, -15.0
-        # Every seed compiles its own model, but all look the same.
-        renderer = self._renderer or mujoco.Renderer(env.model, *self._size)
-        self._renderer = renderer
-        renderer.update_scene(data, camera)
-        return renderer.render().copy()
-
-    def close(self) -> None:
-        """Release the OpenGL context."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
-
-
 def _checked(cfg: QuadrupedEnvCfg | None) -> QuadrupedEnvCfg:
     """Return the default task for None, and refuse what cannot work here."""
     if cfg is None:
@@ -369,32 +258,6 @@ def _observation_space() -> spaces.Box:
 
 def _action_space(cfg: QuadrupedEnvCfg) -> spaces.Box:
     return spaces.Box(-cfg.action_clip, cfg.action_clip, (NUM_ACTIONS,), np.float32)
-
-
-def _read_options(
-    options: dict[str, Any], num_envs: int
-) -> tuple[torch.Tensor | None, torch.Tensor | None]:
-    """Return command (num_envs, 3) and beta (num_envs,), None where one is left out."""
-    unknown = sorted(set(options) - set(_OPTIONS))
-    if unknown:
-        raise ValueError(f"options may hold {list(_OPTIONS)}, got {unknown}")
-    command = _option(options, "command", (num_envs, 3))
-    beta = _option(options, "beta", (num_envs,))
-    if beta is not None and not bool(((beta >= 0.0) & (beta <= 1.0)).all()):
-        raise ValueError(f"options['beta'] must lie in [0, 1], got {options['beta']!r}")
-    return command, beta
-
-
-def _option(options: dict[str, Any], name: str, shape: tuple[int, ...]) -> torch.Tensor | None:
-    if options.get(name) is None:
-        return None
-    value = np.asarray(options[name], dtype=np.float32)
-    if value.shape not in (shape, shape[1:]) or not np.isfinite(value).all():
-        raise ValueError(
-            f"options[{name!r}] must be finite and of shape {shape[1:]} or {shape}, got"
-            f" {options[name]!r}"
-        )
-    return torch.from_numpy(np.broadcast_to(value, shape).copy())
 
 
 gymnasium.register(
