@@ -36,17 +36,18 @@ class SharedGaussian(GaussianDistribution):
         super().update(mlp_output)
         self._row = self.std_param.clamp(*self.std_range)
         """Deviations. Shape: (output_dim,)."""
+        self._log_norm = (self._row.log() + _LOG_ROOT_TWO_PI).sum()
+        """Logarithm of what the density is divided by."""
 
     @property
     def entropy(self) -> torch.Tensor:
         """Entropy of each sample."""
-        each = self._row.log() + (0.5 + _LOG_ROOT_TWO_PI)
-        return each.sum().expand(self.mean.shape[:-1])
+        return (self._log_norm + 0.5 * self.output_dim).expand(self.mean.shape[:-1])
 
     def log_prob(self, outputs: torch.Tensor) -> torch.Tensor:
         """Return the log-probability of each sample."""
         squares = ((outputs - self.mean) / self._row).square().sum(dim=-1)
-        return -0.5 * squares - (self._row.log() + _LOG_ROOT_TWO_PI).sum()
+        return -0.5 * squares - self._log_norm
 
     def kl_divergence(
         self, old_params: tuple[torch.Tensor, ...], new_params: tuple[torch.Tensor, ...]
