@@ -17,6 +17,7 @@ from rsl_rl.storage import RolloutStorage
 from tensordict import TensorDict
 from torch import nn
 
+from mute.normalization import RunningNormalization
 from networks.reflection import Reflection, tie_mlp, tie_vector
 
 __all__ = ["PreparedModel", "PreparedStorage"]
@@ -38,6 +39,8 @@ class PreparedModel(MLPModel):
         comes from its output, without a second exponential.
         """
         super().__init__(*args, **kwargs)
+        if self.obs_normalization:
+            self.obs_normalizer = RunningNormalization(self.obs_dim)
         for layer in self.mlp:
             if isinstance(layer, nn.ELU | nn.ReLU | nn.SELU):
                 layer.inplace = True
@@ -54,12 +57,31 @@ class PreparedModel(MLPModel):
             for deviation in self.distribution.parameters():
                 tie_vector(deviation, target.unsigned)
 
+    def forward(
+        self,
+        obs: TensorDict,
+        masks: torch.Tensor | None = None,
+        hidden_state: HiddenState = None,
+        stochastic_output: bool = False,
+    ) -> torch.Tensor:
+        """Return the output, see `MLPModel.forward`.
+
+        Where the input is ready made nothing is drawn and the mean returned: PPO's update reads the
+        distribution, and leaves the sample unused.
+        """
+        ready = obs.get(self.prepared_group, None)
+        if ready is None or self.distribution is None or not stochastic_output:
+            return super().forward(obs, masks, hidden_state, stochastic_output)
+        self.distribution.update(self.mlp(ready))
+        return self.output_mean
+
     def update_normalization(self, obs: TensorDict) -> None:
         """Learn the input's mean and variance, those of its mirror image included if tied."""
-        super().update_normalization(obs)
+        normalizer = self.obs_normalizer
+        if isinstance(normalizer, RunningNormalization):
+            normalizer.update(*(obs[group] for group in self.obs_groups))
         if self.reflection is None:
             return
-        normalizer = self.obs_normalizer
         mean, variance = normalizer.get_buffer("_mean"), normalizer.get_buffer("_var")
         image = self.reflection(mean)
         # The variance of two halves of the data is the mean of theirs and that of their means.
@@ -81,8 +103,8 @@ class PreparedModel(MLPModel):
 
     @property
     def prepared_group(self) -> str:
-        """Name of the observation group that holds the input ready made."""
-        return "+".join(self.obs_groups)
+        """Name of the observation group that holds the input ready made; no raw group's name."""
+        return "input:" + "+".join(self.obs_groups)
 
 
 class PreparedStorage(RolloutStorage):

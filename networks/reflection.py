@@ -119,10 +119,12 @@ def _tie(parameter: Tensor, place: tuple[Tensor, ...], sign: Tensor, initial_sca
     # One index of entries in a row: a gather by two of them takes several times as long.
     entries = torch.arange(parameter.numel()).view(parameter.shape)[place].flatten()
     entries, sign = entries.to(parameter.device), sign.to(parameter)
+    signed = bool((sign < 0.0).any())
 
     def mirrored(value: Tensor) -> Tensor:
-        return sign * value.reshape(-1).index_select(0, entries).view(value.shape)
+        image = value.reshape(-1).index_select(0, entries).view(value.shape)
+        return image.mul_(sign) if signed else image
 
     with torch.no_grad():
         parameter.copy_(initial_scale * (parameter + mirrored(parameter)))
-    parameter.register_hook(lambda grad: 0.5 * (grad + mirrored(grad)))
+    parameter.register_hook(lambda grad: mirrored(grad).add_(grad).mul_(0.5))

@@ -40,3 +40,28 @@ def test_no_activation_keeps_its_input():
     activations = [layer for layer in model.mlp if isinstance(layer, torch.nn.ELU)]
     assert len(activations) == 2
     assert all(layer.inplace for layer in activations)
+
+
+def test_an_update_draws_no_actions_and_sees_the_same_distribution():
+    obs = TensorDict({"policy": torch.randn(4, 10)}, batch_size=4)
+    gaussian = {"class_name": "mute.distribution:SharedGaussian", "init_std": 0.5}
+    model = PreparedModel(
+        obs, {"actor": ["policy"]}, "actor", 3, (16, 8), distribution_cfg=gaussian
+    )
+    drawn = model(obs, stochastic_output=True)
+    expected = [part.clone() for part in model.output_distribution_params]
+    assert not torch.equal(drawn, model.output_mean)
+    before = torch.get_rng_state()
+    prepared = TensorDict({model.prepared_group: obs["policy"]}, batch_size=4)
+    output = model(prepared, stochastic_output=True)
+    assert torch.equal(torch.get_rng_state(), before)
+    assert torch.equal(output, expected[0])
+    for one, other in zip(model.output_distribution_params, expected, strict=True):
+        assert torch.equal(one, other)
+
+
+def test_a_single_raw_group_is_not_taken_for_an_input_ready_made():
+    obs = TensorDict({"policy": 5.0 + torch.randn(100, 10)}, batch_size=100)
+    model = PreparedModel(obs, {"actor": ["policy"]}, "actor", 3, (16, 8), obs_normalization=True)
+    model.update_normalization(obs)
+    assert model.get_latent(obs).mean().abs() < 0.1
