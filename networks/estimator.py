@@ -14,10 +14,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from networks.lstm import State, lstm_sequence, lstm_step
 from networks.reflection import Reflection, tie_layer, tie_mlp, tie_vector
 
-State = tuple[Tensor, Tensor]
-"""Hidden and cell state of the LSTM, each of shape (N, lstm_hidden)."""
+__all__ = ["Estimate", "Estimator", "EstimatorCfg", "State"]
 
 _ACTIVATIONS: dict[str, type[nn.Module]] = {"elu": nn.ELU, "relu": nn.ReLU, "tanh": nn.Tanh}
 _LOG_VAR_RANGE = (-10.0, 5.0)
@@ -114,8 +114,8 @@ class Estimator(nn.Module):
         """
         super().__init__()
         self.cfg = cfg = cfg if cfg is not None else EstimatorCfg()
-        # LSTMCell holds the weights; its equations are written out below, so that `unroll` can
-        # multiply the observations of all steps at once.
+        # LSTMCell holds the weights; its equations are those of `networks.lstm`, so that `unroll`
+        # can multiply the observations of all steps at once.
         self.lstm = nn.LSTMCell(obs_dim, cfg.lstm_hidden)
         self.base_lin_vel_head = nn.Linear(cfg.lstm_hidden, 3)
         self.heights_head = nn.Linear(cfg.lstm_hidden, num_heights)
@@ -178,7 +178,7 @@ class Estimator(nn.Module):
             obs: Observations. Shape: (N, obs_dim).
             state: Hidden and cell state. Shapes: (N, lstm_hidden).
         """
-        state = _lstm_step(self._project(obs), state, self.lstm.weight_hh)
+        state = lstm_step(self._project(obs), state, self.lstm.weight_hh)
         return self._heads(state[0]), state
 
     def unroll(
@@ -211,14 +211,8 @@ class Estimator(nn.Module):
                 f"starts must be a bool tensor of shape {tuple(obs.shape[:2])}, "
                 f"got {starts.dtype} of shape {tuple(starts.shape)}"
             )
-        hidden = []
-        for projected, start in zip(
-            self._project(obs).unbind(0), starts[..., None].unbind(0), strict=True
-        ):
-            kept = (state[0].masked_fill(start, 0.0), state[1].masked_fill(start, 0.0))
-            state = _lstm_step(projected, kept, self.lstm.weight_hh)
-            hidden.append(state[0])
-        return self._heads(torch.stack(hidden), sample, generator), state
+        hidden, cell = lstm_sequence(self._project(obs), state, starts, self.lstm.weight_hh)
+        return self._heads(hidden, sample, generator), (hidden[-1], cell)
 
     def decode(self, latent: Tensor) -> Tensor:
         """Predict the next observation from the latent: (., latent_dim) to (., obs_dim)."""
@@ -242,18 +236,6 @@ class Estimator(nn.Module):
         )
         metres = self.cfg.height_offset + self.cfg.height_scale * heights
         return Estimate(base_lin_vel, metres, mean, log_var, latent, phase)
-
-
-def _lstm_step(projected: Tensor, state: State, weight_hh: Tensor) -> State:
-    """Advance an LSTM by one step, with the gates in torch's order i, f, g, o.
-
-    Source: Hochreiter and Schmidhuber, 1997; Gers et al., 2000 (forget gate).
-    """
-    hidden, cell = state
-    gates = torch.addmm(projected, hidden, weight_hh.t())
-    input_gate, forget_gate, candidate, output_gate = gates.chunk(4, dim=-1)
-    cell = torch.sigmoid(forget_gate) * cell + torch.sigmoid(input_gate) * torch.tanh(candidate)
-    return torch.sigmoid(output_gate) * torch.tanh(cell), cell
 
 
 def _sample(mean: Tensor, log_var: Tensor, generator: torch.Generator | None) -> Tensor:
