@@ -32,13 +32,22 @@ class PreparedModel(MLPModel):
     reflection: Reflection | None = None
     """How its input is mirrored, if it is tied."""
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401
+    def __init__(
+        self,
+        obs: TensorDict,
+        obs_groups: dict[str, list[str]],
+        obs_set: str,
+        *args: Any,  # noqa: ANN401
+        **kwargs: Any,  # noqa: ANN401
+    ) -> None:
         """Build the networks, see `MLPModel`.
 
         Activations work in place: nothing else reads what they are given, and ELU's gradient then
         comes from its output, without a second exponential.
         """
-        super().__init__(*args, **kwargs)
+        super().__init__(obs, obs_groups, obs_set, *args, **kwargs)
+        self.prepared_group = f"prepared for {obs_set}"
+        """Name of the observation group that holds the input ready made."""
         if self.obs_normalization:
             self.obs_normalizer = RunningNormalization(self.obs_dim)
         for layer in self.mlp:
@@ -66,13 +75,16 @@ class PreparedModel(MLPModel):
     ) -> torch.Tensor:
         """Return the output, see `MLPModel.forward`.
 
-        Where the input is ready made nothing is drawn and the mean returned: PPO's update reads the
-        distribution, and leaves the sample unused.
+        Where the input is ready made nothing is drawn, and the mean returned: PPO's update reads
+        the distribution, and leaves the sample unused.
         """
         ready = obs.get(self.prepared_group, None)
-        if ready is None or self.distribution is None or not stochastic_output:
+        if ready is None:
             return super().forward(obs, masks, hidden_state, stochastic_output)
-        self.distribution.update(self.mlp(ready))
+        output = self.mlp(ready)
+        if self.distribution is None:
+            return output
+        self.distribution.update(output)
         return self.output_mean
 
     def update_normalization(self, obs: TensorDict) -> None:
@@ -90,21 +102,6 @@ class PreparedModel(MLPModel):
         )
         normalizer._mean = 0.5 * (mean + image)
         normalizer._std = normalizer._var.sqrt()
-
-    def get_latent(
-        self,
-        obs: TensorDict,
-        masks: torch.Tensor | None = None,
-        hidden_state: HiddenState = None,
-    ) -> torch.Tensor:
-        """Return the network's input, see `MLPModel.get_latent`. Shape: (batch, obs_dim)."""
-        ready = obs.get(self.prepared_group, None)
-        return super().get_latent(obs, masks, hidden_state) if ready is None else ready
-
-    @property
-    def prepared_group(self) -> str:
-        """Name of the observation group that holds the input ready made; no raw group's name."""
-        return "input:" + "+".join(self.obs_groups)
 
 
 class PreparedStorage(RolloutStorage):

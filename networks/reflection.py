@@ -40,7 +40,9 @@ class Reflection:
         """
         places = range(len(self.index))
         if len(self.sign) != len(self.index) or any(
-            self.index[self.index[i]] != i or self.sign[i] * self.sign[self.index[i]] != 1.0
+            self.index[self.index[i]] != i
+            or abs(self.sign[i]) != 1.0
+            or self.sign[i] != self.sign[self.index[i]]
             for i in places
         ):
             raise ValueError(f"this is not a reflection: {self}")
@@ -119,7 +121,7 @@ def _tie(parameter: Tensor, place: tuple[Tensor, ...], sign: Tensor, initial_sca
     # One index of entries in a row: a gather by two of them takes several times as long.
     entries = torch.arange(parameter.numel()).view(parameter.shape)[place].flatten()
     entries, sign = entries.to(parameter.device), sign.to(parameter)
-    signed = bool((sign < 0.0).any())
+    signed = bool((sign != 1.0).any())
 
     def mirrored(value: Tensor) -> Tensor:
         image = value.reshape(-1).index_select(0, entries).view(value.shape)

@@ -8,6 +8,7 @@ from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 
 from mute.storage import PreparedModel
+from networks.reflection import Reflection
 
 
 @pytest.mark.parametrize("activation", ["elu", "relu", "selu", "tanh"])
@@ -42,26 +43,56 @@ def test_no_activation_keeps_its_input():
     assert all(layer.inplace for layer in activations)
 
 
-def test_an_update_draws_no_actions_and_sees_the_same_distribution():
-    obs = TensorDict({"policy": torch.randn(4, 10)}, batch_size=4)
+def _make_actor(obs, **sizes):
+    torch.manual_seed(0)
     gaussian = {"class_name": "mute.distribution:SharedGaussian", "init_std": 0.5}
+    groups, sizes = {"actor": ["policy"]}, {"hidden_dims": (16, 8)} | sizes
     model = PreparedModel(
-        obs, {"actor": ["policy"]}, "actor", 3, (16, 8), distribution_cfg=gaussian
+        obs, groups, "actor", 4, distribution_cfg=gaussian, obs_normalization=True, **sizes
     )
+    model.update_normalization(obs)
+    return model
+
+
+def _make_obs():
+    torch.manual_seed(1)
+    return TensorDict({"policy": 5.0 + torch.randn(100, 10)}, batch_size=100)
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_an_update_draws_no_actions_and_sees_the_same_distribution(tied):
+    obs = _make_obs()
+    model = _make_actor(obs)
+    if tied:
+        model.tie(Reflection.swapped(10), Reflection.swapped(4))
     drawn = model(obs, stochastic_output=True)
-    expected = [part.clone() for part in model.output_distribution_params]
     assert not torch.equal(drawn, model.output_mean)
-    before = torch.get_rng_state()
-    prepared = TensorDict({model.prepared_group: obs["policy"]}, batch_size=4)
-    output = model(prepared, stochastic_output=True)
+    prepared = TensorDict({model.prepared_group: model.get_latent(obs)}, batch_size=100)
+    before, results = torch.get_rng_state(), []
+    for observations in (obs, prepared):
+        torch.set_rng_state(before)
+        model(observations, stochastic_output=True)
+        log_prob = model.get_output_log_prob(drawn.detach())
+        gradients = torch.autograd.grad(log_prob.square().mean(), [*model.parameters()])
+        results.append((*model.output_distribution_params, log_prob, gradients))
     assert torch.equal(torch.get_rng_state(), before)
-    assert torch.equal(output, expected[0])
-    for one, other in zip(model.output_distribution_params, expected, strict=True):
-        assert torch.equal(one, other)
+    torch.testing.assert_close(*results)
+
+
+def test_a_critic_without_a_distribution_gives_its_output():
+    obs = _make_obs()
+    model = PreparedModel(obs, {"critic": ["policy"]}, "critic", 1, (16, 8))
+    model.tie(Reflection.swapped(10), Reflection.unchanged(1))
+    prepared = TensorDict({model.prepared_group: model.get_latent(obs)}, batch_size=100)
+    torch.testing.assert_close(model(prepared), model(obs))
 
 
 def test_a_single_raw_group_is_not_taken_for_an_input_ready_made():
-    obs = TensorDict({"policy": 5.0 + torch.randn(100, 10)}, batch_size=100)
-    model = PreparedModel(obs, {"actor": ["policy"]}, "actor", 3, (16, 8), obs_normalization=True)
-    model.update_normalization(obs)
-    assert model.get_latent(obs).mean().abs() < 0.1
+    obs = _make_obs()
+    assert _make_actor(obs).get_latent(obs).mean().abs() < 0.1
+
+
+def test_two_models_of_the_same_groups_prepare_inputs_of_their_own():
+    obs = _make_obs()
+    models = [PreparedModel(obs, {name: ["policy"]}, name, 3, (8,)) for name in ("actor", "critic")]
+    assert models[0].prepared_group != models[1].prepared_group
