@@ -24,7 +24,7 @@ def test_statistics_of_several_updates_are_those_of_rsl_rl():
         inputs = _make_inputs(num_samples, seed)
         ours.update(*inputs.split(WIDTHS, dim=1))
         theirs.update(inputs)
-    assert ours.count == theirs.count == 1207
+    assert ours.get_buffer("count") == theirs.get_buffer("count") == 1207
     torch.testing.assert_close(ours.state_dict(), theirs.state_dict(), rtol=1e-4, atol=1e-6)
     inputs = _make_inputs(50, 3)
     torch.testing.assert_close(ours(inputs), theirs(inputs), rtol=1e-3, atol=1e-3)

@@ -63,7 +63,8 @@ def test_the_gradient_of_a_sequence_is_that_of_finite_differences():
     lstm = _make_cell()
     obs, starts, hidden, cell = _make_inputs()
     projected = _project(lstm, obs).detach().requires_grad_()
-    hidden.requires_grad_(), cell.requires_grad_()
+    for state in (hidden, cell):
+        state.requires_grad_()
 
     def sequence(projected, hidden, cell, weight):
         return lstm_sequence(projected, (hidden, cell), starts, weight)
