@@ -43,13 +43,11 @@ def test_no_activation_keeps_its_input():
     assert all(layer.inplace for layer in activations)
 
 
-def _make_actor(obs, **sizes):
+def _make_actor(obs):
     torch.manual_seed(0)
     gaussian = {"class_name": "mute.distribution:SharedGaussian", "init_std": 0.5}
-    groups, sizes = {"actor": ["policy"]}, {"hidden_dims": (16, 8)} | sizes
-    model = PreparedModel(
-        obs, groups, "actor", 4, distribution_cfg=gaussian, obs_normalization=True, **sizes
-    )
+    settings = {"obs_normalization": True, "distribution_cfg": gaussian}
+    model = PreparedModel(obs, {"actor": ["policy"]}, "actor", 4, (16, 8), **settings)
     model.update_normalization(obs)
     return model
 

@@ -10,17 +10,17 @@ from networks.lstm import lstm_sequence, lstm_step
 NUM_STEPS, NUM_ENVS, OBS_DIM, WIDTH = 6, 5, 3, 4
 
 
-def _make_cell(dtype=torch.float64):
+def _make_cell():
     torch.manual_seed(0)
-    return torch.nn.LSTMCell(OBS_DIM, WIDTH, dtype=dtype)
+    return torch.nn.LSTMCell(OBS_DIM, WIDTH, dtype=torch.float64)
 
 
-def _make_inputs(dtype=torch.float64):
+def _make_inputs():
     torch.manual_seed(1)
-    obs = torch.randn(NUM_STEPS, NUM_ENVS, OBS_DIM, dtype=dtype)
+    obs = torch.randn(NUM_STEPS, NUM_ENVS, OBS_DIM, dtype=torch.float64)
     starts = torch.zeros(NUM_STEPS, NUM_ENVS, dtype=torch.bool)
     starts[0, 0] = starts[2, 1] = starts[5, 2] = True
-    hidden, cell = torch.randn(2, NUM_ENVS, WIDTH, dtype=dtype)
+    hidden, cell = torch.randn(2, NUM_ENVS, WIDTH, dtype=torch.float64)
     return obs, starts, hidden, cell
 
 
