@@ -8,34 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any, get_args
+from typing import Any
 
 import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from envs.commands import CommandSampler, CommandsCfg
-from envs.footfall import FootfallCfg, Footfalls
-from envs.observations import (
-    OBS_DIM,
-    ObservationsCfg,
-    noise_amplitude,
-    policy_observation,
-    slices,
-)
-from envs.randomization import PHYSICS_DIM, RandomizationCfg, randomize_physics
-from envs.rewards import Motion, RewardsCfg, RewardSum
-from envs.scene import (
-    FOOT_RADIUS,
-    LEGS,
-    STAND_JOINT_POS,
-    SceneCfg,
-    build_scene,
-)
-from envs.sensors import sensor_history, sensor_slice
-from envs.simulation import Engine, make_simulation
-from envs.terrain import FlatTerrain, HeightMapCfg, height_map
+from envs.commands import CommandSampler
+from envs.footfall import Footfalls
+from envs.observations import OBS_DIM, noise_amplitude, policy_observation, slices
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
+from envs.randomization import PHYSICS_DIM, randomize_physics
+from envs.rewards import Motion, RewardSum
+from envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS, build_scene
+from envs.sensors import RobotSensors
+from envs.simulation import make_simulation
+from envs.terrain import FlatTerrain, Terrain
 
 __all__ = ["NUM_ACTIONS", "QuadrupedEnv", "QuadrupedEnvCfg"]
 
@@ -44,78 +32,6 @@ HEIGHT_OFFSET = 0.30
 """Height that the critic's height map is centred on, m."""
 HEIGHT_SCALE = 0.1
 """Difference in height that is 1 in the critic's height map, m."""
-_NUM_LINKS = 14
-"""Collision shapes other than feet: trunk, head, and hip, thigh and shank of each leg."""
-
-
-@dataclass
-class QuadrupedEnvCfg:
-    """The task: everything about the world and nothing about learning."""
-
-    num_envs: int = 1024
-    """Number of robots."""
-    seed: int = 0
-    """Seed of every draw in the environment."""
-    engine: Engine = "auto"
-    """Physics: `mjbatch` on the CPU, `warp` (MuJoCo Warp), or `auto`, the one that suits the
-    device."""
-    num_threads: int = 0
-    """Threads of `mjbatch`; 0 takes every logical CPU."""
-    decimation: int = 4
-    """Physics steps a control step; with 5 ms steps, 50 Hz."""
-    episode_length: float = 20.0
-    """Longest episode, s."""
-    action_scale: float = 0.25
-    """Radians of joint offset for an action of 1."""
-    action_clip: float = 10.0
-    """Largest magnitude of an action."""
-    max_tilt: float = 1.0
-    """Angle between trunk and vertical that ends an episode, rad."""
-    initial_joint_noise: float = 0.1
-    """Half width of the uniform offset of each joint at reset, rad."""
-    initial_velocity: float = 0.2
-    """Half width of the trunk's uniform initial velocities, m/s and rad/s."""
-    random_heading: bool = True
-    """Whether robots start in random directions."""
-    scene: SceneCfg = field(default_factory=SceneCfg)
-    """Robot, floor and solver."""
-    footfall: FootfallCfg = field(default_factory=FootfallCfg)
-    """How contacts are debounced and landings measured."""
-    height_map: HeightMapCfg = field(default_factory=HeightMapCfg)
-    """Grid of the height map."""
-    commands: CommandsCfg = field(default_factory=CommandsCfg)
-    """Ranges of the commands."""
-    observations: ObservationsCfg = field(default_factory=ObservationsCfg)
-    """Scales and noise."""
-    rewards: RewardsCfg = field(default_factory=RewardsCfg)
-    """Weights and constants of the reward."""
-    randomization: RandomizationCfg = field(default_factory=RandomizationCfg)
-    """Physics that differs between robots, and pushes."""
-
-    def __post_init__(self) -> None:
-        """Check the fields.
-
-        Raises:
-            ValueError: If one is out of its range.
-        """
-        if self.engine not in get_args(Engine):
-            raise ValueError(
-                f"env.engine must be one of {', '.join(get_args(Engine))}, got {self.engine!r}"
-            )
-        for name in ("num_envs", "decimation"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"env.{name} must be >= 1, got {getattr(self, name)}")
-        for name in ("episode_length", "action_scale", "action_clip", "max_tilt"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"env.{name} must be > 0 and finite, got {getattr(self, name)}")
-        for name in ("initial_joint_noise", "initial_velocity"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"env.{name} must be >= 0 and finite, got {getattr(self, name)}")
-
-    @property
-    def step_dt(self) -> float:
-        """Control period, s."""
-        return self.scene.timestep * self.decimation
 
 
 class QuadrupedEnv(VecEnv):
@@ -163,10 +79,10 @@ class QuadrupedEnv(VecEnv):
         self.generator = torch.Generator(self.device).manual_seed(cfg.seed)
         self.physics = randomize_physics(self.simulation, cfg.randomization, self.generator)
         """Randomised physics as the critic sees it. Shape: (num_envs, PHYSICS_DIM)."""
-        self._bind_sensors()
+        self._sensors = RobotSensors(self.simulation)
         self.grid = cfg.height_map.grid(self.device)
         """Points of the height map in the heading frame, m. Shape: (num_heights, 2)."""
-        self.terrain = FlatTerrain()
+        self.terrain: Terrain = FlatTerrain()
         self.commands = CommandSampler(cfg.commands, cfg.num_envs, self.generator, self.device)
         self.footfalls = Footfalls(
             cfg.footfall, cfg.num_envs, cfg.scene.timestep, cfg.decimation, self.device
@@ -322,13 +238,13 @@ class QuadrupedEnv(VecEnv):
             for _ in range(self.cfg.decimation):
                 simulation.step()
                 self.on_physics_step()
-        self.footfalls.record(self._foot_vel_z_history, self._foot_contact_history)
+        self.footfalls.record(self._sensors.foot_vel_z_history, self._sensors.foot_contact_history)
         self.unstable = simulation.unstable()
         if bool(self.unstable.any()):
             # Reset before anything is read, so that no NaN reaches a reward or an average.
             self.unstable_count += int(self.unstable.sum())
             simulation.reset(self.unstable, keyframe=self.model.key("stand").id)
-            self.footfalls.reset(self.unstable, self._foot_contact)
+            self.footfalls.reset(self.unstable, self._sensors.foot_contact)
 
     def _read_state(self) -> None:
         """Derive what rewards and observations share from the engine's state."""
@@ -355,8 +271,8 @@ class QuadrupedEnv(VecEnv):
 
     def _motion(self) -> Motion:
         feet = self.footfalls
-        ground = self.terrain.height(self._foot_pos[:, :, :2])
-        clearance = self._foot_pos[:, :, 2] - FOOT_RADIUS - ground
+        ground = self.terrain.height(self._sensors.foot_pos[:, :, :2])
+        clearance = self._sensors.foot_pos[:, :, 2] - FOOT_RADIUS - ground
         feet.update(clearance)
         joint_acc = (self.joint_vel - self.last_joint_vel) / self.step_dt
         self.last_joint_vel = self.joint_vel.clone()
@@ -376,11 +292,11 @@ class QuadrupedEnv(VecEnv):
             action=self.action,
             last_action=self.last_action,
             action_before_last=self.action_before_last,
-            collisions=(self._link_contact > 0.0).sum(dim=1).float(),
+            collisions=(self._sensors.link_contact > 0.0).sum(dim=1).float(),
             phase=self._estimated_phase if estimated else feet.phase,
             foot_drop_sq=feet.drop_sq,
             foot_raise_sq=feet.raise_sq,
-            foot_speed_xy=self._foot_vel[:, :, :2].norm(dim=2),
+            foot_speed_xy=self._sensors.foot_vel[:, :, :2].norm(dim=2),
             foot_height=clearance,
             contact=feet.contact,
             touchdown=feet.touchdown,
@@ -391,7 +307,7 @@ class QuadrupedEnv(VecEnv):
 
     def _terminated(self) -> torch.Tensor:
         upright = -self.projected_gravity[:, 2]
-        self.fallen = (self._trunk_contact > 0.0).any(dim=1) | (
+        self.fallen = (self._sensors.trunk_contact > 0.0).any(dim=1) | (
             upright < math.cos(self.cfg.max_tilt)
         )
         return self.fallen | self.unstable
@@ -414,7 +330,7 @@ class QuadrupedEnv(VecEnv):
         simulation.ctrl[:] = torch.where(column, self.stand, simulation.ctrl)
         self._lift_to_ground(mask)
         self.commands.resample(mask, True, self._ramp(self.cfg.commands.ramp))
-        self.footfalls.reset(mask, self._foot_contact)
+        self.footfalls.reset(mask, self._sensors.foot_contact)
         for name in ("action", "last_action", "action_before_last", "last_joint_vel"):
             setattr(self, name, getattr(self, name).masked_fill(column, 0.0))
         self.episode_length_buf = self.episode_length_buf.masked_fill(mask, 0)
@@ -423,8 +339,8 @@ class QuadrupedEnv(VecEnv):
     def _lift_to_ground(self, mask: torch.Tensor) -> None:
         """Put the lowest foot of each masked robot on the ground: joint noise would bury it."""
         self.simulation.forward(mask)
-        ground = self.terrain.height(self._foot_pos[:, :, :2])
-        clearance = (self._foot_pos[:, :, 2] - FOOT_RADIUS - ground).amin(dim=1)
+        ground = self.terrain.height(self._sensors.foot_pos[:, :, :2])
+        clearance = (self._sensors.foot_pos[:, :, 2] - FOOT_RADIUS - ground).amin(dim=1)
         self.simulation.qpos[:, 2] -= torch.where(mask, clearance, 0.0)
         self.simulation.forward(mask)
 
@@ -457,7 +373,7 @@ class QuadrupedEnv(VecEnv):
         )
         if self.cfg.observations.noise_level > 0.0:
             policy += self._noise * (2.0 * self._draw(*policy.shape) - 1.0)
-        heights = height_map(self.terrain, self.grid, self.base_pos, self.heading)
+        heights = self.terrain.height_map(self.grid, self.base_pos, self.heading)
         feet = self.footfalls
         privileged = torch.cat(
             (
@@ -511,27 +427,6 @@ class QuadrupedEnv(VecEnv):
         return torch.ones(self.num_envs, dtype=torch.bool, device=self.device)
 
     # -- set-up ----------------------------------------------------------------------------------
-
-    def _bind_sensors(self) -> None:
-        data, feet = self.simulation.sensordata, len(LEGS)
-
-        def view(first: str, count: int) -> torch.Tensor:
-            return data[:, sensor_slice(self.model, first, count)]
-
-        self._foot_pos = view(f"{LEGS[0]}_foot_pos", feet).unflatten(1, (feet, 3))
-        self._foot_vel = view(f"{LEGS[0]}_foot_vel", feet).unflatten(1, (feet, 3))
-        self._foot_contact = view(f"{LEGS[0]}_foot_contact", feet)
-        self._trunk_contact = view("trunk_contact", 2)
-        self._link_contact = view("trunk_contact", _NUM_LINKS)
-
-        def past(first: str) -> torch.Tensor:
-            columns, samples, size = sensor_history(self.model, first, feet)
-            rows = self.simulation.history[:, columns].unflatten(1, (feet, -1))
-            readings = rows[:, :, 2 + samples :].unflatten(2, (samples, size))
-            return readings.permute(2, 0, 1, 3)
-
-        self._foot_vel_z_history = past(f"{LEGS[0]}_foot_vel")[..., 2]
-        self._foot_contact_history = past(f"{LEGS[0]}_foot_contact")[..., 0]
 
     def _allocate(self) -> None:
         num_envs, device = self.num_envs, self.device

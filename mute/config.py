@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import cattrs
 
-from envs.quadruped_env import QuadrupedEnvCfg
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from networks.estimator import EstimatorCfg
 
 __all__ = ["AgentCfg", "EstimationCfg", "PPOCfg", "TaskCfg", "from_plain", "to_plain"]

@@ -26,7 +26,7 @@ import torch
 from torch import nn
 
 from envs.observations import OBS_DIM, OBSERVATION_WIDTHS
-from envs.quadruped_env import QuadrupedEnvCfg
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.scene import JOINT_NAMES, build_scene
 from mute.command_lines.arguments import command_line, parse
 from mute.controllers import load_policy

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from envs.commands import CommandsCfg
-from envs.quadruped_env import QuadrupedEnvCfg
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.randomization import RandomizationCfg
 from envs.rewards import RewardsCfg
 from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg

@@ -15,7 +15,7 @@ import torch
 import yaml
 
 from envs.menagerie import SceneError
-from envs.quadruped_env import QuadrupedEnvCfg
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.checkpoint import (
     CheckpointError,
     latest_checkpoint,

@@ -15,7 +15,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from envs.commands import CommandsCfg
 from envs.gym import Go1Env, Go1VectorEnv
 from envs.observations import OBSERVATION_WIDTHS, ObservationsCfg, slices
-from envs.quadruped_env import QuadrupedEnvCfg
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.rewards import RewardsCfg
 
 POLICY = slices(OBSERVATION_WIDTHS)

@@ -7,10 +7,10 @@ import math
 import pytest
 import torch
 
-from envs.terrain import FlatTerrain, HeightMapCfg, height_map
+from envs.terrain import FlatTerrain, HeightMapCfg, Terrain
 
 
-class _Slope(FlatTerrain):
+class _Slope(Terrain):
     """Ground as high as the world's x, plus a hundred times its y."""
 
     def height(self, points):
@@ -62,10 +62,12 @@ def test_flat_ground_is_at_zero_everywhere():
     assert torch.equal(FlatTerrain().height(points), torch.zeros(1, 2))
 
 
-def test_over_flat_ground_every_height_is_the_trunks():
+def test_over_flat_ground_every_height_is_the_trunks_wherever_the_grid_lies():
     base_pos = torch.tensor([[5.0, 1.0, 0.31], [0.0, 0.0, 0.2]])
-    heights = height_map(FlatTerrain(), HeightMapCfg().grid(), base_pos, _heading(0.3, 2.0))
-    torch.testing.assert_close(heights, torch.tensor([[0.31], [0.2]]).expand(2, 35))
+    where = HeightMapCfg().grid(), base_pos, _heading(0.3, 2.0)
+    heights = FlatTerrain().height_map(*where)
+    assert torch.equal(heights, torch.tensor([[0.31], [0.2]]).expand(2, 35))
+    assert torch.equal(heights, Terrain.height_map(FlatTerrain(), *where))
 
 
 @pytest.mark.parametrize(
@@ -80,6 +82,6 @@ def test_over_flat_ground_every_height_is_the_trunks():
 def test_the_grid_turns_with_the_heading(yaw, world):
     ahead_and_left = torch.tensor([[0.4, 0.1]])
     base_pos = torch.tensor([[2.0, 3.0, 0.3]])
-    heights = height_map(_Slope(), ahead_and_left, base_pos, _heading(yaw))
+    heights = _Slope().height_map(ahead_and_left, base_pos, _heading(yaw))
     ground = (2.0 + world[0]) + 100.0 * (3.0 + world[1])
     torch.testing.assert_close(heights, torch.tensor([[0.3 - ground]]))

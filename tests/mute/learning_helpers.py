@@ -8,7 +8,7 @@ from typing import Any
 import torch
 
 from envs.commands import CommandsCfg
-from envs.quadruped_env import QuadrupedEnvCfg
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.randomization import RandomizationCfg
 from envs.rewards import RewardsCfg
 from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg

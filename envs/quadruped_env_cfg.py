@@ -1,0 +1,88 @@
+"""The robot's world as data: what a task may set, and the ranges that it must keep to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import get_args
+
+from envs.commands import CommandsCfg
+from envs.footfall import FootfallCfg
+from envs.observations import ObservationsCfg
+from envs.randomization import RandomizationCfg
+from envs.rewards import RewardsCfg
+from envs.scene import SceneCfg
+from envs.simulation import Engine
+from envs.terrain import HeightMapCfg
+
+__all__ = ["QuadrupedEnvCfg"]
+
+
+@dataclass
+class QuadrupedEnvCfg:
+    """The task: everything about the world and nothing about learning."""
+
+    num_envs: int = 1024
+    """Number of robots."""
+    seed: int = 0
+    """Seed of every draw in the environment."""
+    engine: Engine = "auto"
+    """Physics: `mjbatch` on the CPU, `warp` (MuJoCo Warp), or `auto`, the one that suits the
+    device."""
+    num_threads: int = 0
+    """Threads of `mjbatch`; 0 takes every logical CPU."""
+    decimation: int = 4
+    """Physics steps a control step; with 5 ms steps, 50 Hz."""
+    episode_length: float = 20.0
+    """Longest episode, s."""
+    action_scale: float = 0.25
+    """Radians of joint offset for an action of 1."""
+    action_clip: float = 10.0
+    """Largest magnitude of an action."""
+    max_tilt: float = 1.0
+    """Angle between trunk and vertical that ends an episode, rad."""
+    initial_joint_noise: float = 0.1
+    """Half width of the uniform offset of each joint at reset, rad."""
+    initial_velocity: float = 0.2
+    """Half width of the trunk's uniform initial velocities, m/s and rad/s."""
+    random_heading: bool = True
+    """Whether robots start in random directions."""
+    scene: SceneCfg = field(default_factory=SceneCfg)
+    """Robot, floor and solver."""
+    footfall: FootfallCfg = field(default_factory=FootfallCfg)
+    """How contacts are debounced and landings measured."""
+    height_map: HeightMapCfg = field(default_factory=HeightMapCfg)
+    """Grid of the height map."""
+    commands: CommandsCfg = field(default_factory=CommandsCfg)
+    """Ranges of the commands."""
+    observations: ObservationsCfg = field(default_factory=ObservationsCfg)
+    """Scales and noise."""
+    rewards: RewardsCfg = field(default_factory=RewardsCfg)
+    """Weights and constants of the reward."""
+    randomization: RandomizationCfg = field(default_factory=RandomizationCfg)
+    """Physics that differs between robots, and pushes."""
+
+    def __post_init__(self) -> None:
+        """Check the fields.
+
+        Raises:
+            ValueError: If one is out of its range.
+        """
+        if self.engine not in get_args(Engine):
+            raise ValueError(
+                f"env.engine must be one of {', '.join(get_args(Engine))}, got {self.engine!r}"
+            )
+        for name in ("num_envs", "decimation"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"env.{name} must be >= 1, got {getattr(self, name)}")
+        for name in ("episode_length", "action_scale", "action_clip", "max_tilt"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"env.{name} must be > 0 and finite, got {getattr(self, name)}")
+        for name in ("initial_joint_noise", "initial_velocity"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"env.{name} must be >= 0 and finite, got {getattr(self, name)}")
+
+    @property
+    def step_dt(self) -> float:
+        """Control period, s."""
+        return self.scene.timestep * self.decimation
