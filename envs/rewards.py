@@ -256,7 +256,9 @@ def smoothness(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
 
 def power_distribution(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:
     """Penalise power that is spread unevenly over the joints."""
-    return (motion.torque * motion.joint_vel).var(dim=1, correction=0)
+    power = motion.torque * motion.joint_vel
+    # Not `var`, which takes ten times as long over rows this short on a CPU.
+    return (power - power.mean(dim=1, keepdim=True)).square().mean(dim=1)
 
 
 def foot_clearance(motion: Motion, cfg: RewardsCfg) -> torch.Tensor:

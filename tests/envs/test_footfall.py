@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 
 from envs.footfall import FootfallCfg, Footfalls
 
@@ -50,6 +52,23 @@ def _play(footfalls, found, vel_z=None, clearance=None, foot=(0, 0)):
 
 def _landing_speeds(results):
     return [step["landing_speed"] for step in results if step["touchdown"]]
+
+
+_PHYSICS_STEPS = st.lists(st.tuples(st.booleans(), st.integers(-20, 20)), min_size=40, max_size=40)
+
+
+@given(_PHYSICS_STEPS)
+def test_a_landing_speed_is_the_fastest_drop_of_the_20_ms_that_end_with_contact(steps):
+    found = "".join(".#"[touch] for touch, _ in steps)
+    drop = [max(0.0, -vel / 10.0) for _, vel in steps]
+    results = _play(_make_footfalls(), found, [vel / 10.0 for _, vel in steps])
+    for i, step in enumerate(results):
+        if not step["touchdown"]:
+            assert step["landing_speed"] == 0.0
+            continue
+        # Confirmed by the second control step of contact: the first opened with it.
+        first = found.index("#", (i - 1) * DECIMATION)
+        assert step["landing_speed"] == pytest.approx(max(drop[max(0, first - 3) : first + 1]))
 
 
 def test_a_peak_between_the_50_hz_samples_is_the_landing_speed():
