@@ -18,6 +18,7 @@ from tensordict import TensorDict
 from torch import nn
 
 from mute.normalization import RunningNormalization
+from networks.elu import ELU
 from networks.reflection import Reflection, tie_mlp, tie_vector
 
 __all__ = ["PreparedModel", "PreparedStorage"]
@@ -42,16 +43,18 @@ class PreparedModel(MLPModel):
     ) -> None:
         """Build the networks, see `MLPModel`.
 
-        Activations work in place: nothing else reads what they are given, and ELU's gradient then
-        comes from its output, without a second exponential.
+        Activations are fast on a CPU: ELU is ours, and others work in place, since nothing else
+        reads what they are given.
         """
         super().__init__(obs, obs_groups, obs_set, *args, **kwargs)
         self.prepared_group = f"prepared for {obs_set}"
         """Name of the observation group that holds the input ready made."""
         if self.obs_normalization:
             self.obs_normalizer = RunningNormalization(self.obs_dim)
-        for layer in self.mlp:
-            if isinstance(layer, nn.ELU | nn.ReLU | nn.SELU):
+        for place, layer in enumerate(self.mlp):
+            if isinstance(layer, nn.ELU):
+                self.mlp[place] = ELU()
+            elif isinstance(layer, nn.ReLU | nn.SELU):
                 layer.inplace = True
 
     def tie(self, source: Reflection, target: Reflection) -> None:

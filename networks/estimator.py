@@ -14,12 +14,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from networks.elu import ELU
 from networks.lstm import State, lstm_sequence, lstm_step
 from networks.reflection import Reflection, tie_layer, tie_mlp, tie_vector
 
 __all__ = ["Estimate", "Estimator", "EstimatorCfg", "State"]
 
-_ACTIVATIONS: dict[str, type[nn.Module]] = {"elu": nn.ELU, "relu": nn.ReLU, "tanh": nn.Tanh}
+_ACTIVATIONS: dict[str, type[nn.Module]] = {"elu": ELU, "relu": nn.ReLU, "tanh": nn.Tanh}
 _LOG_VAR_RANGE = (-10.0, 5.0)
 
 

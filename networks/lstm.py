@@ -1,10 +1,9 @@
 """An LSTM whose input is projected beforehand: one step of it, and a sequence with its gradient.
 
-Gates lie in torch's order i, f, g, o. Autograd's own gradient of a sequence makes some twenty small
-tensors a step and one product a step for the recurrent weight; the one written out here fills one
-buffer of gates, and has one product for all steps. There tanh x is 2 sigmoid(2 x) - 1, which takes
-torch a third of the time on a CPU and differs from it by 1e-7 at most. A step, by which policies
-act, keeps torch's own tanh: what they have been measured to do stays the same to the last bit.
+Gates lie in torch's order i, f, g, o. tanh x is 2 sigmoid(2 x) - 1, which takes torch a third of
+the time on a CPU and differs from it by 1e-7 at most. Autograd's own gradient of a sequence makes
+some twenty small tensors a step and one product a step for the recurrent weight; the one written
+out here fills one buffer of gates, and has one product for all steps.
 
 Source: Hochreiter and Schmidhuber, 1997; Gers et al., 2000 (forget gate).
 """
@@ -36,8 +35,12 @@ def lstm_step(projected: Tensor, state: State, weight_hh: Tensor) -> State:
     hidden, cell = state
     gates = torch.addmm(projected, hidden, weight_hh.t())
     input_gate, forget_gate, candidate, output_gate = gates.chunk(4, dim=-1)
-    cell = torch.sigmoid(forget_gate) * cell + torch.sigmoid(input_gate) * torch.tanh(candidate)
-    return torch.sigmoid(output_gate) * torch.tanh(cell), cell
+    cell = torch.sigmoid(forget_gate) * cell + torch.sigmoid(input_gate) * _tanh(candidate)
+    return torch.sigmoid(output_gate) * _tanh(cell), cell
+
+
+def _tanh(value: Tensor) -> Tensor:
+    return 2.0 * torch.sigmoid(2.0 * value) - 1.0
 
 
 def lstm_sequence(

@@ -1,0 +1,45 @@
+"""ELU against torch's own, and its gradient against the numerical one."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from torch.nn import functional
+
+from networks.elu import ELU
+
+
+def test_it_is_within_1e_7_of_the_exact_value():
+    value = torch.linspace(-30.0, 30.0, 60_001)
+    exact = functional.elu(value.double())
+    worst = (ELU()(value).double() - exact).abs().max()
+    assert worst <= 1.2e-7
+
+
+@pytest.mark.parametrize("value", [0.0, -math.inf, math.inf, math.nan])
+def test_it_is_torchs_where_numbers_end(value):
+    tensor = torch.full((3,), value)
+    torch.testing.assert_close(ELU()(tensor), functional.elu(tensor), equal_nan=True)
+
+
+def test_it_leaves_its_input_alone():
+    value = torch.tensor([-1.0, 2.0])
+    ELU()(value)
+    assert value.tolist() == [-1.0, 2.0]
+
+
+def test_its_gradient_is_the_numerical_one():
+    torch.manual_seed(0)
+    value = torch.randn(5, 3, dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(ELU(), value)
+
+
+def test_a_row_is_the_same_whatever_rows_stand_beside_it():
+    # Where rows do not fill vectors, torch computes what is left over another way, as in its own.
+    torch.manual_seed(0)
+    value = torch.randn(37, 64)
+    whole = ELU()(value)
+    rows = torch.stack([ELU()(row) for row in value])
+    assert torch.equal(rows, whole)
