@@ -77,6 +77,7 @@ class Footfalls:
         self._raise = torch.zeros(decimation, *shape, device=device)
         self._touch = torch.zeros(self._depth, *shape, dtype=torch.bool, device=device)
         self._step = torch.arange(self._depth, dtype=torch.float32, device=device)[:, None, None]
+        self._countdown = self._depth - self._step
         self._contacts = CausalContacts(
             num_envs, _NUM_FEET, min_steps=self.min_steps, device=device
         )
@@ -186,8 +187,7 @@ class Footfalls:
         begin = self._depth - self.min_steps * self._decimation
         # The largest countdown that is met with contact is the first: an argmax takes ten times as
         # long on a CPU.
-        countdown = self._depth - self._step[begin:]
-        first = self._depth - (self._touch[begin:] * countdown).amax(dim=0)
+        first = self._depth - (self._touch[begin:] * self._countdown[begin:]).amax(dim=0)
         inside = (self._step <= first) & (self._step > first - self._window)
         # Of all feet, though few have landed: to pick these out, a GPU would have to be waited for.
         return torch.where(self.touchdown, (self._drop * inside).amax(dim=0), 0.0)

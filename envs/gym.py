@@ -20,7 +20,8 @@ from gymnasium.vector.utils import batch_space
 from envs.camera import Camera
 from envs.gym_robots import Robots
 from envs.observations import OBS_DIM
-from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnvCfg
+from envs.quadruped_env import NUM_ACTIONS
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.rewards import RewardsCfg
 
 __all__ = ["Go1Env", "Go1VectorEnv"]

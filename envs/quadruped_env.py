@@ -25,7 +25,7 @@ from envs.sensors import RobotSensors
 from envs.simulation import make_simulation
 from envs.terrain import FlatTerrain, Terrain
 
-__all__ = ["NUM_ACTIONS", "QuadrupedEnv", "QuadrupedEnvCfg"]
+__all__ = ["NUM_ACTIONS", "QuadrupedEnv"]
 
 NUM_ACTIONS = 12
 HEIGHT_OFFSET = 0.30

@@ -10,10 +10,10 @@ from envs.simulation import Simulation
 
 __all__ = ["RobotSensors", "sensor_history", "sensor_slice"]
 
-_NUM_LINKS = 14
+_NUM_SHAPES = 14
 """Collision shapes other than feet: trunk, head, and hip, thigh and shank of each leg."""
-_NUM_TRUNK_LINKS = 2
-"""Trunk and head, the first of them."""
+_NUM_TRUNK_SHAPES = 2
+"""The first two of them: trunk and head."""
 
 
 class RobotSensors:
@@ -28,33 +28,32 @@ class RobotSensors:
         Raises:
             ValueError: If the model lacks one of them.
         """
-        self._simulation = simulation
-        self.foot_pos = self._now(f"{LEGS[0]}_foot_pos", len(LEGS)).unflatten(1, (len(LEGS), 3))
+        feet, model = len(LEGS), simulation.model
+
+        def now(first: str, count: int) -> torch.Tensor:
+            return simulation.sensordata[:, sensor_slice(model, first, count)]
+
+        def past(first: str) -> torch.Tensor:
+            columns, samples, size = sensor_history(model, first, feet)
+            rows = simulation.history[:, columns].unflatten(1, (feet, -1))
+            readings = rows[:, :, 2 + samples :].unflatten(2, (samples, size))
+            return readings.permute(2, 0, 1, 3)
+
+        self.foot_pos = now(f"{LEGS[0]}_foot_pos", feet).unflatten(1, (feet, 3))
         """Centre of each foot in the world, m. Shape: (num_envs, 4, 3)."""
-        self.foot_vel = self._now(f"{LEGS[0]}_foot_vel", len(LEGS)).unflatten(1, (len(LEGS), 3))
+        self.foot_vel = now(f"{LEGS[0]}_foot_vel", feet).unflatten(1, (feet, 3))
         """Velocity of each foot in the world, m/s. Shape: (num_envs, 4, 3)."""
-        self.foot_contact = self._now(f"{LEGS[0]}_foot_contact", len(LEGS))
+        self.foot_contact = now(f"{LEGS[0]}_foot_contact", feet)
         """Number of contacts of each foot. Shape: (num_envs, 4)."""
-        self.trunk_contact = self._now("trunk_contact", _NUM_TRUNK_LINKS)
+        self.trunk_contact = now("trunk_contact", _NUM_TRUNK_SHAPES)
         """Number of contacts of trunk and head. Shape: (num_envs, 2)."""
-        self.link_contact = self._now("trunk_contact", _NUM_LINKS)
+        self.link_contact = now("trunk_contact", _NUM_SHAPES)
         """Number of contacts of every link but the feet. Shape: (num_envs, 14)."""
-        self.foot_vel_z_history = self._past(f"{LEGS[0]}_foot_vel")[..., 2]
+        self.foot_vel_z_history = past(f"{LEGS[0]}_foot_vel")[..., 2]
         """Vertical velocity of each foot at the last physics steps, the oldest first, m/s.
         Shape: (foot_samples, num_envs, 4)."""
-        self.foot_contact_history = self._past(f"{LEGS[0]}_foot_contact")[..., 0]
+        self.foot_contact_history = past(f"{LEGS[0]}_foot_contact")[..., 0]
         """Number of contacts of each foot, likewise. Shape: (foot_samples, num_envs, 4)."""
-
-    def _now(self, first: str, count: int) -> torch.Tensor:
-        columns = sensor_slice(self._simulation.model, first, count)
-        return self._simulation.sensordata[:, columns]
-
-    def _past(self, first: str) -> torch.Tensor:
-        feet = len(LEGS)
-        columns, samples, size = sensor_history(self._simulation.model, first, feet)
-        rows = self._simulation.history[:, columns].unflatten(1, (feet, -1))
-        readings = rows[:, :, 2 + samples :].unflatten(2, (samples, size))
-        return readings.permute(2, 0, 1, 3)
 
 
 def sensor_slice(model: mujoco.MjModel, first_name: str, count: int) -> slice:

@@ -61,7 +61,7 @@ class Terrain(ABC):
                 Shape: (num_envs, 2).
 
         Returns:
-            Heights, to be read only. Shape: (num_envs, num_points).
+            Heights, maybe a view of `base_pos`. Shape: (num_envs, num_points).
         """
         cos, sin = heading[:, :1], heading[:, 1:]
         along, across = grid[:, 0], grid[:, 1]

@@ -12,7 +12,8 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.threads import use_collection_threads, use_learning_threads
 from networks.estimator import Estimate, Estimator, State
 

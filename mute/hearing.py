@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.acoustics.levels import READINGS_PER_SECOND
 from mute.acoustics.listener import Listener
 from mute.acoustics.microphone import Microphone

@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 from gymnasium import spaces
 
-from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnvCfg
+from envs.quadruped_env import NUM_ACTIONS
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.scene import STAND_JOINT_POS, build_scene
 
 __all__ = ["PlainGo1"]

@@ -15,7 +15,8 @@ import torch
 from rsl_rl.runners import OnPolicyRunner
 
 from envs.observations import OBS_DIM
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.algorithm import EstimatorPPO
 from mute.checkpoint import CheckpointError, first_line, load_checkpoint, save_checkpoint
 from mute.config import TaskCfg, to_plain

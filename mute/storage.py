@@ -19,6 +19,7 @@ from torch import nn
 
 from mute.normalization import RunningNormalization
 from networks.elu import ELU
+from networks.perceptron import perceptron
 from networks.reflection import Reflection, tie_mlp, tie_vector
 
 __all__ = ["PreparedModel", "PreparedStorage"]
@@ -43,8 +44,8 @@ class PreparedModel(MLPModel):
     ) -> None:
         """Build the networks, see `MLPModel`.
 
-        Activations are fast on a CPU: ELU is ours, and others work in place, since nothing else
-        reads what they are given.
+        Activations work in place, since nothing else reads what they are given, or as fast as they
+        can on a CPU, see `networks.elu`.
         """
         super().__init__(obs, obs_groups, obs_set, *args, **kwargs)
         self.prepared_group = f"prepared for {obs_set}"
@@ -53,7 +54,7 @@ class PreparedModel(MLPModel):
             self.obs_normalizer = RunningNormalization(self.obs_dim)
         for place, layer in enumerate(self.mlp):
             if isinstance(layer, nn.ELU):
-                self.mlp[place] = ELU()
+                self.mlp[place] = ELU(inplace=True)
             elif isinstance(layer, nn.ReLU | nn.SELU):
                 layer.inplace = True
 
@@ -84,7 +85,7 @@ class PreparedModel(MLPModel):
         ready = obs.get(self.prepared_group, None)
         if ready is None:
             return super().forward(obs, masks, hidden_state, stochastic_output)
-        output = self.mlp(ready)
+        output = perceptron(self.mlp, ready)
         if self.distribution is None:
             return output
         self.distribution.update(output)

@@ -1,7 +1,7 @@
-"""ELU, whose exponential is a power of two on a CPU: torch's own takes three times as long there.
+"""ELU, whose exponential is a power of two on a CPU: torch's own takes half as long again there.
 
-exp(x) - 1 = 2^(x log2 e) - 1, within 1e-7 of torch's `expm1`: the difference of two float32 of the
-order of 1. On a GPU, and in an exported graph, it is torch's.
+exp(x) - 1 = 2^(x log2 e) - 1, in float32 within 1e-7 of the exact value, as torch's `expm1` is. On
+a GPU, in half precision and in an exported or scripted graph it is torch's.
 
 Source: Clevert et al., "Fast and accurate deep network learning by exponential linear units", 2016.
 """
@@ -14,24 +14,61 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
+from torch.nn import functional
 
-__all__ = ["ELU"]
+__all__ = ["ELU", "elu_backward", "elu_into"]
 
 _LOG2_E = math.log2(math.e)
 
 
-class ELU(nn.ELU):
-    """x where x > 0, else exp(x) - 1, as torch's with its default alpha."""
+def elu_into(value: Tensor, out: Tensor, scratch: Tensor) -> Tensor:
+    """Write the activation of a tensor to another on the same CPU, and return that.
 
-    def __init__(self) -> None:
-        """Make the activation."""
-        super().__init__()
+    Args:
+        value: What is activated. Any shape.
+        out: Where it goes; it may be `scratch`. The same shape.
+        scratch: Memory to work in, which is overwritten. The same shape.
+    """
+    torch.clamp(value, max=0.0, out=scratch).mul_(_LOG2_E).exp2_().sub_(1.0)
+    return torch.maximum(value, scratch, out=out)
+
+
+def elu_backward(grad: Tensor, output: Tensor, out: Tensor) -> Tensor:
+    """Write the gradient of the activation's input to a tensor, and return that.
+
+    Args:
+        grad: Gradient of the output. Any shape.
+        output: The output. The same shape.
+        out: Where it goes; it may be `grad`. The same shape.
+    """
+    return torch.ops.aten.elu_backward.grad_input(grad, 1.0, 1.0, 1.0, True, output, grad_input=out)
+
+
+class ELU(nn.ELU):
+    """x where x > 0, else exp(x) - 1, as torch's with its default alpha. No second derivative."""
+
+    def __init__(self, inplace: bool = False) -> None:
+        """Make the activation.
+
+        Args:
+            inplace: Whether it may overwrite its input.
+        """
+        super().__init__(inplace=inplace)
 
     def forward(self, input: Tensor) -> Tensor:
-        """Return the activation, out of place, of a tensor of any shape."""
-        if not input.is_cpu or torch.compiler.is_exporting():
-            return super().forward(input)
-        return _PowerOfTwo.apply(input)
+        """Return the activation of a tensor of any shape."""
+        if torch.jit.is_scripting():  # pyright: ignore[reportPrivateImportUsage]
+            return functional.elu(input)
+        return self._fastest(input)
+
+    @torch.jit.unused
+    def _fastest(self, value: Tensor) -> Tensor:
+        tracing = torch.jit.is_tracing()  # pyright: ignore[reportPrivateImportUsage]
+        if tracing or torch.compiler.is_exporting():
+            return functional.elu(value)
+        if not value.is_cpu or value.dtype not in (torch.float32, torch.float64):
+            return functional.elu(value, inplace=self.inplace)
+        return _PowerOfTwo.apply(value)
 
 
 class _PowerOfTwo(torch.autograd.Function):
@@ -40,8 +77,8 @@ class _PowerOfTwo(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, value: Tensor) -> Tensor:  # noqa: ANN401
         """Return the activation and keep it."""
-        negative = value.clamp(max=0.0).mul_(_LOG2_E).exp2_().sub_(1.0)
-        output = torch.maximum(value, negative, out=negative)
+        output = torch.empty_like(value)
+        elu_into(value, output, scratch=output)
         ctx.save_for_backward(output)
         return output
 
@@ -53,4 +90,4 @@ class _PowerOfTwo(torch.autograd.Function):
     ) -> Tensor:
         """Return the gradient of what `forward` was given."""
         (output,) = ctx.saved_tensors
-        return torch.ops.aten.elu_backward(grad_outputs[0], 1.0, 1.0, 1.0, True, output)
+        return elu_backward(grad_outputs[0], output, torch.empty_like(output))

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 
 from envs.observations import OBS_DIM
@@ -15,6 +14,7 @@ from envs.quadruped_env import NUM_ACTIONS
 from mute.checkpoint import CheckpointError, first_line, load_checkpoint
 from mute.config import TaskCfg, from_plain
 from mute.estimated_env import estimate_group
+from mute.storage import PreparedModel
 from networks.estimator import Estimate, Estimator
 
 __all__ = ["LearnedController", "Policy", "load_policy", "make_policy"]
@@ -32,8 +32,8 @@ class Policy:
     """Last finished iteration."""
     estimator: Estimator
     """The estimator, in evaluation mode."""
-    actor: MLPModel
-    """rsl_rl's actor, its normaliser inside, in evaluation mode."""
+    actor: PreparedModel
+    """The actor, its normaliser inside, in evaluation mode."""
 
 
 def load_policy(path: Path) -> Policy:
@@ -101,8 +101,8 @@ class LearnedController:
         return policy.actor(TensorDict(groups, batch_size=[self.num_envs]))
 
 
-def _actor(cfg: TaskCfg, estimator: Estimator) -> MLPModel:
-    """Build the actor's network with rsl_rl's own class, from the sizes of its inputs."""
+def _actor(cfg: TaskCfg, estimator: Estimator) -> PreparedModel:
+    """Build the actor's network with the class that learns, from the sizes of its inputs."""
     with torch.no_grad():
         obs = torch.zeros(1, OBS_DIM)
         estimate, _ = estimator.step(obs, estimator.initial_state(1))
@@ -110,4 +110,4 @@ def _actor(cfg: TaskCfg, estimator: Estimator) -> MLPModel:
     example = TensorDict({"policy": obs, "estimate": group}, batch_size=[1])
     train_cfg = cfg.agent.rsl_rl()
     settings = {key: value for key, value in train_cfg["actor"].items() if key != "class_name"}
-    return MLPModel(example, train_cfg["obs_groups"], "actor", NUM_ACTIONS, **settings)
+    return PreparedModel(example, train_cfg["obs_groups"], "actor", NUM_ACTIONS, **settings)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.scene import FloorPatch
 from mute.acoustics.floors import FLOORS
 

@@ -8,7 +8,8 @@ from collections.abc import Callable
 import torch
 from tensordict import TensorDict
 
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.controllers.controller import Controller
 from mute.evaluation.gait import GaitMeter
 

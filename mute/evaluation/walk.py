@@ -15,7 +15,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.scene import FloorPatch
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.levels import READINGS_PER_SECOND

@@ -9,7 +9,8 @@ import torch
 
 from envs.commands import CommandsCfg
 from envs.observations import OBSERVATION_WIDTHS, ObservationsCfg, slices
-from envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE, QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE, QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.randomization import RandomizationCfg
 from envs.rewards import TERMS, RewardsCfg
 from envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS

@@ -13,7 +13,8 @@ import torch
 from learning_helpers import make_runner
 from tensordict import TensorDict
 
-from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.checkpoint import save_checkpoint
 from mute.command_lines import evaluate
 from mute.config import to_plain

@@ -18,7 +18,8 @@ import pytest
 import torch
 
 from envs.commands import CommandsCfg
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.randomization import RandomizationCfg
 from envs.scene import JOINT_NAMES
 from mute.checkpoint import save_checkpoint
@@ -188,6 +189,15 @@ def test_the_graph_has_the_agreed_inputs_and_outputs(exported: Path):
 def test_the_opset_is_at_least_17(exported: Path):
     versions = {entry.domain: entry.version for entry in onnx.load(exported).opset_import}
     assert versions[""] >= 17
+
+
+def test_activations_are_one_operation_each(exported: Path):
+    graph = onnx.load(exported).graph
+    operations = {node.op_type for node in graph.node} | {
+        node.op_type for function in onnx.load(exported).functions for node in function.node
+    }
+    assert {"Elu", "Tanh"} <= operations
+    assert not operations & {"Exp", "Pow", "Max"}
 
 
 def test_everything_is_in_one_file(exported: Path):

@@ -11,7 +11,8 @@ import pytest
 import torch
 from tensordict import TensorDict
 
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.scene import SceneCfg
 from mute.acoustics.fan import FAN_LEVEL
 from mute.acoustics.floors import FLOORS

@@ -14,7 +14,8 @@ import pytest
 import torch
 from tensordict import TensorDict
 
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
 from mute.acoustics.sound_level_meter import SoundLevelMeter
 from mute.acoustics.wav import read_wav

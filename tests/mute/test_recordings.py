@@ -6,7 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
 from mute.acoustics.wav_file import WavFile
 from mute.errors import MuteError

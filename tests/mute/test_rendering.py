@@ -16,7 +16,8 @@ import pytest
 import torch
 from tensordict import TensorDict
 
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.acoustics.listener import SAMPLE_RATE
 from mute.acoustics.wav import read_wav, write_wav
 from mute.checkpoint import save_checkpoint
@@ -36,7 +37,8 @@ FILM = """
 import sys
 from pathlib import Path
 import torch
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.rendering.video import Video
 
 folder = Path(sys.argv[1])

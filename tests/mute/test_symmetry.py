@@ -10,7 +10,8 @@ from learning_helpers import differences, everything, make_cfg
 from tensordict import TensorDict
 
 from envs.observations import OBS_DIM, ObservationsCfg
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.randomization import RandomizationCfg
 from envs.terrain import HeightMapCfg
 from mute.checkpoint import CheckpointError

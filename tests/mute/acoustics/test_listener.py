@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import torch
 
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.acoustics.gains import load_gains
 from mute.acoustics.levels import LevelDetector
 from mute.acoustics.listener import SAMPLE_RATE, Listener

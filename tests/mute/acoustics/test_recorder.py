@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from envs.quadruped_env import QuadrupedEnv, QuadrupedEnvCfg
+from envs.quadruped_env import QuadrupedEnv
+from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from envs.randomization import RandomizationCfg
 from envs.scene import FloorPatch, SceneCfg
 from mute.acoustics.recorder import Recorder, effective_mass
