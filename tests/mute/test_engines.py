@@ -112,7 +112,7 @@ def test_the_same_actions_from_the_same_state_give_the_same_walk_for_100_control
 
 def _figures(engine):
     """Return what robots do in 1000 control steps: gait, and every reward's mean per second."""
-    num_envs, steps = 12, 1000
+    num_envs, steps = 32, 1000
     env = _make_env(engine, num_envs)
     controller = LearnedController(POLICY, num_envs)
     meter = GaitMeter(env)
