@@ -271,8 +271,7 @@ class QuadrupedEnv(VecEnv):
 
     def _motion(self) -> Motion:
         feet = self.footfalls
-        ground = self.terrain.height(self._sensors.foot_pos[:, :, :2])
-        clearance = self._sensors.foot_pos[:, :, 2] - FOOT_RADIUS - ground
+        clearance = self._clearance()
         feet.update(clearance)
         joint_acc = (self.joint_vel - self.last_joint_vel) / self.step_dt
         self.last_joint_vel = self.joint_vel.clone()
@@ -304,6 +303,11 @@ class QuadrupedEnv(VecEnv):
             swing_apex=feet.swing_apex,
             fallen=self.fallen,
         )
+
+    def _clearance(self) -> torch.Tensor:
+        """Return the air between each foot and the ground, m. Shape: (num_envs, 4)."""
+        foot_pos = self._sensors.foot_pos
+        return foot_pos[:, :, 2] - FOOT_RADIUS - self.terrain.height(foot_pos[:, :, :2])
 
     def _terminated(self) -> torch.Tensor:
         upright = -self.projected_gravity[:, 2]
@@ -339,9 +343,8 @@ class QuadrupedEnv(VecEnv):
     def _lift_to_ground(self, mask: torch.Tensor) -> None:
         """Put the lowest foot of each masked robot on the ground: joint noise would bury it."""
         self.simulation.forward(mask)
-        ground = self.terrain.height(self._sensors.foot_pos[:, :, :2])
-        clearance = (self._sensors.foot_pos[:, :, 2] - FOOT_RADIUS - ground).amin(dim=1)
-        self.simulation.qpos[:, 2] -= torch.where(mask, clearance, 0.0)
+        lowest = self._clearance().amin(dim=1)
+        self.simulation.qpos[:, 2] -= torch.where(mask, lowest, 0.0)
         self.simulation.forward(mask)
 
     def _resample_and_push(self, dones: torch.Tensor) -> None:

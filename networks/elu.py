@@ -16,21 +16,27 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
-__all__ = ["ELU", "elu_backward", "elu_into"]
+__all__ = ["ELU", "elu_backward", "elu_into", "has_fast_elu"]
 
 _LOG2_E = math.log2(math.e)
 
 
-def elu_into(value: Tensor, out: Tensor, scratch: Tensor) -> Tensor:
+def has_fast_elu(value: Tensor) -> bool:
+    """Return whether `elu_into` is for a tensor: on a CPU, and while no graph is being made."""
+    tracing = torch.jit.is_tracing()  # pyright: ignore[reportPrivateImportUsage]
+    makes_graph = tracing or torch.compiler.is_exporting()
+    return value.is_cpu and value.dtype in (torch.float32, torch.float64) and not makes_graph
+
+
+def elu_into(value: Tensor, out: Tensor) -> Tensor:
     """Write the activation of a tensor to another on the same CPU, and return that.
 
     Args:
         value: What is activated. Any shape.
-        out: Where it goes; it may be `scratch`. The same shape.
-        scratch: Memory to work in, which is overwritten. The same shape.
+        out: Where it goes, other memory than `value`. The same shape.
     """
-    torch.clamp(value, max=0.0, out=scratch).mul_(_LOG2_E).exp2_().sub_(1.0)
-    return torch.maximum(value, scratch, out=out)
+    torch.clamp(value, max=0.0, out=out).mul_(_LOG2_E).exp2_().sub_(1.0)
+    return torch.maximum(value, out, out=out)
 
 
 def elu_backward(grad: Tensor, output: Tensor, out: Tensor) -> Tensor:
@@ -63,12 +69,7 @@ class ELU(nn.ELU):
 
     @torch.jit.unused
     def _fastest(self, value: Tensor) -> Tensor:
-        tracing = torch.jit.is_tracing()  # pyright: ignore[reportPrivateImportUsage]
-        if tracing or torch.compiler.is_exporting():
-            return functional.elu(value)
-        if not value.is_cpu or value.dtype not in (torch.float32, torch.float64):
-            return functional.elu(value, inplace=self.inplace)
-        return _PowerOfTwo.apply(value)
+        return _PowerOfTwo.apply(value) if has_fast_elu(value) else super().forward(value)
 
 
 class _PowerOfTwo(torch.autograd.Function):
@@ -77,8 +78,7 @@ class _PowerOfTwo(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, value: Tensor) -> Tensor:  # noqa: ANN401
         """Return the activation and keep it."""
-        output = torch.empty_like(value)
-        elu_into(value, output, scratch=output)
+        output = elu_into(value, torch.empty_like(value))
         ctx.save_for_backward(output)
         return output
 

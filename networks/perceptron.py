@@ -16,7 +16,7 @@ import torch
 from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
-from networks.elu import ELU, elu_backward, elu_into
+from networks.elu import ELU, elu_backward, elu_into, has_fast_elu
 
 __all__ = ["perceptron"]
 
@@ -35,8 +35,7 @@ def perceptron(layers: nn.Sequential, value: Tensor) -> Tensor:
     linear = [layer for layer in layers if isinstance(layer, nn.Linear) and layer.bias is not None]
     hidden = [layer for layer in layers if isinstance(layer, ELU)]
     expected = [layer for pair in zip(linear, hidden, strict=False) for layer in pair] + linear[-1:]
-    floats = (torch.float32, torch.float64)
-    in_blocks = value.is_cpu and value.dtype in floats and not value.requires_grad
+    in_blocks = has_fast_elu(value) and not value.requires_grad
     if not in_blocks or list(layers) != expected:
         return layers(value)
     parameters = [parameter for layer in linear for parameter in (layer.weight, layer.bias)]
@@ -61,15 +60,13 @@ class _Perceptron(torch.autograd.Function):
         """Return the last layer's output."""
         weights, biases = parameters[::2], parameters[1::2]
         outputs = [value.new_empty(len(value), len(bias)) for bias in biases]
-        widths = [len(bias) for bias in biases[:-1]]
-        before, scratch = _Buffer(widths, value), _Buffer(widths, value)
+        before = _Buffer([len(bias) for bias in biases[:-1]], value)
         for first in range(0, len(value), _ROWS):
             rows = slice(first, first + _ROWS)
             block = value[rows]
             for weight, bias, output in zip(weights[:-1], biases, outputs, strict=False):
-                size = len(block), len(bias)
-                linear = torch.addmm(bias, block, weight.t(), out=before.block(*size))
-                block = elu_into(linear, output[rows], scratch.block(*size))
+                buffer = before.block(len(block), len(bias))
+                block = elu_into(torch.addmm(bias, block, weight.t(), out=buffer), output[rows])
             torch.addmm(biases[-1], block, weights[-1].t(), out=outputs[-1][rows])
         ctx.save_for_backward(value, *outputs[:-1], *weights)
         return outputs[-1]
