@@ -13,19 +13,39 @@ from typing import Any
 
 import torch
 from torch import Tensor, nn
-from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
-__all__ = ["ELU", "elu_backward", "elu_into", "has_fast_elu"]
+__all__ = ["ELU", "elu_backward", "elu_into", "has_fast_form", "refuse_second_derivative"]
 
 _LOG2_E = math.log2(math.e)
 
 
-def has_fast_elu(value: Tensor) -> bool:
-    """Return whether `elu_into` is for a tensor: on a CPU, and while no graph is being made."""
-    tracing = torch.jit.is_tracing()  # pyright: ignore[reportPrivateImportUsage]
-    makes_graph = tracing or torch.compiler.is_exporting()
-    return value.is_cpu and value.dtype in (torch.float32, torch.float64) and not makes_graph
+def has_fast_form(value: Tensor) -> bool:
+    """Return whether activations of a tensor take their fast form.
+
+    They do on a CPU in single and double precision, unless operations are being traced, exported,
+    compiled or transformed instead of done.
+    """
+    if not value.is_cpu or value.dtype not in (torch.float32, torch.float64):
+        return False
+    return not (
+        torch.jit.is_tracing()  # pyright: ignore[reportPrivateImportUsage]
+        or torch.compiler.is_compiling()  # or exporting
+        or torch._C._are_functorch_transforms_active()
+    )
+
+
+def refuse_second_derivative(what: str) -> None:
+    """Raise where a backward pass is itself recorded.
+
+    torch's `once_differentiable` lets such a pass through if nothing that follows needs its result,
+    and a gradient penalty is then wrong without a word.
+
+    Raises:
+        RuntimeError: If gradients are recorded.
+    """
+    if torch.is_grad_enabled():
+        raise RuntimeError(f"{what} has no second derivative: do not set create_graph")
 
 
 def elu_into(value: Tensor, out: Tensor) -> Tensor:
@@ -51,15 +71,14 @@ def elu_backward(grad: Tensor, output: Tensor, out: Tensor) -> Tensor:
 
 
 class ELU(nn.ELU):
-    """x where x > 0, else exp(x) - 1, as torch's with its default alpha. No second derivative."""
+    """x where x > 0, else exp(x) - 1, as torch's with its default alpha.
 
-    def __init__(self, inplace: bool = False) -> None:
-        """Make the activation.
+    Its output is kept for the gradient and must not be changed in place.
+    """
 
-        Args:
-            inplace: Whether it may overwrite its input.
-        """
-        super().__init__(inplace=inplace)
+    def __init__(self) -> None:
+        """Make the activation."""
+        super().__init__()
 
     def forward(self, input: Tensor) -> Tensor:
         """Return the activation of a tensor of any shape."""
@@ -69,7 +88,7 @@ class ELU(nn.ELU):
 
     @torch.jit.unused
     def _fastest(self, value: Tensor) -> Tensor:
-        return _PowerOfTwo.apply(value) if has_fast_elu(value) else super().forward(value)
+        return _PowerOfTwo.apply(value) if has_fast_form(value) else functional.elu(value)
 
 
 class _PowerOfTwo(torch.autograd.Function):
@@ -83,11 +102,12 @@ class _PowerOfTwo(torch.autograd.Function):
         return output
 
     @staticmethod
-    @once_differentiable
     def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
         ctx: Any,  # noqa: ANN401
         *grad_outputs: Tensor,
     ) -> Tensor:
         """Return the gradient of what `forward` was given."""
         (output,) = ctx.saved_tensors
+        if torch.is_grad_enabled():  # a gradient of the gradient will be asked for
+            return torch.ops.aten.elu_backward(grad_outputs[0], 1.0, 1.0, 1.0, True, output)
         return elu_backward(grad_outputs[0], output, torch.empty_like(output))

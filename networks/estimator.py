@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from networks.elu import ELU
-from networks.lstm import State, lstm_sequence, lstm_step
+from networks.lstm import State, Weights, lstm_sequence, lstm_step
 from networks.reflection import Reflection, tie_layer, tie_mlp, tie_vector
 
 __all__ = ["Estimate", "Estimator", "EstimatorCfg", "State"]
@@ -115,8 +115,7 @@ class Estimator(nn.Module):
         """
         super().__init__()
         self.cfg = cfg = cfg if cfg is not None else EstimatorCfg()
-        # LSTMCell holds the weights; its equations are those of `networks.lstm`, so that `unroll`
-        # can multiply the observations of all steps at once.
+        # LSTMCell holds the weights; its equations are those of `networks.lstm`.
         self.lstm = nn.LSTMCell(obs_dim, cfg.lstm_hidden)
         self.base_lin_vel_head = nn.Linear(cfg.lstm_hidden, 3)
         self.heights_head = nn.Linear(cfg.lstm_hidden, num_heights)
@@ -179,7 +178,7 @@ class Estimator(nn.Module):
             obs: Observations. Shape: (N, obs_dim).
             state: Hidden and cell state. Shapes: (N, lstm_hidden).
         """
-        state = lstm_step(self._project(obs), state, self.lstm.weight_hh)
+        state = lstm_step(obs, state, self._lstm_weights())
         return self._heads(state[0]), state
 
     def unroll(
@@ -212,25 +211,30 @@ class Estimator(nn.Module):
                 f"starts must be a bool tensor of shape {tuple(obs.shape[:2])}, "
                 f"got {starts.dtype} of shape {tuple(starts.shape)}"
             )
-        hidden, cell = lstm_sequence(self._project(obs), state, starts, self.lstm.weight_hh)
+        hidden, cell = lstm_sequence(obs, state, starts, self._lstm_weights())
         return self._heads(hidden, sample, generator), (hidden[-1], cell)
 
     def decode(self, latent: Tensor) -> Tensor:
         """Predict the next observation from the latent: (., latent_dim) to (., obs_dim)."""
         return self.decoder(latent)
 
-    def _project(self, obs: Tensor) -> Tensor:
-        """Return what the observation adds to the gates. Shape: (., 4 * lstm_hidden)."""
-        return functional.linear(obs, self.lstm.weight_ih, self.lstm.bias_ih + self.lstm.bias_hh)
+    def _lstm_weights(self) -> Weights:
+        lstm = self.lstm
+        return Weights(lstm.weight_ih, lstm.weight_hh, lstm.bias_ih + lstm.bias_hh)
 
     def _heads(
         self, hidden: Tensor, sample: bool = False, generator: torch.Generator | None = None
     ) -> Estimate:
         """Turn hidden states, shape (., lstm_hidden), into an estimate."""
-        base_lin_vel = self.base_lin_vel_head(hidden)
-        heights = self.heights_head(hidden)
-        mean = self.latent_mean_head(hidden)
-        log_var = self.latent_log_var_head(hidden).clamp(*_LOG_VAR_RANGE)
+        # One product for all heads: each has too few outputs to keep a processor busy.
+        heads = self.heights_head, self.base_lin_vel_head, self.latent_mean_head
+        heads = *heads, self.latent_log_var_head
+        weight = torch.cat([head.weight for head in heads])
+        outputs = functional.linear(hidden, weight, torch.cat([head.bias for head in heads]))
+        heights, base_lin_vel, mean, log_var = outputs.split(
+            [head.out_features for head in heads], dim=-1
+        )
+        log_var = log_var.clamp(*_LOG_VAR_RANGE)
         latent = _sample(mean, log_var, generator) if sample else mean
         phase = torch.sigmoid(
             self.phase_network(torch.cat((heights, base_lin_vel, latent), dim=-1))

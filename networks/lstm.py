@@ -1,22 +1,24 @@
-"""An LSTM whose input is projected beforehand: one step of it, and a sequence with its gradient.
+"""An LSTM: one step of it, and a sequence with its gradient.
 
-Gates lie in torch's order i, f, g, o. tanh x is 2 sigmoid(2 x) - 1, which takes torch a third of
-the time on a CPU and differs from it by 2e-7 at most. Autograd's own gradient of a sequence makes
-some twenty small tensors a step and one product a step for the recurrent weight; the one written
-out here fills one buffer of gates, and has one product for all steps.
+Gates lie in torch's order i, f, g, o. Where activations have their fast form (see `networks.elu`),
+tanh x is 2 sigmoid(2 x) - 1, which takes torch a third of the time on a CPU and differs from it by
+2e-7 at most; a sequence has it everywhere. Autograd's own gradient of a sequence makes some twenty
+small tensors a step and two products a step for the weights; the one written out here fills one
+buffer of gates, and has one product for all steps.
 
 Source: Hochreiter and Schmidhuber, 1997; Gers et al., 2000 (forget gate).
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
-__all__ = ["State", "lstm_sequence", "lstm_step"]
+from networks.elu import has_fast_form, refuse_second_derivative
+
+__all__ = ["State", "Weights", "lstm_sequence", "lstm_step"]
 
 State = tuple[Tensor, Tensor]
 """Hidden and cell state of the LSTM, each of shape (N, H)."""
@@ -24,42 +26,68 @@ State = tuple[Tensor, Tensor]
 _sigmoid_backward = torch.ops.aten.sigmoid_backward.grad_input
 
 
-def lstm_step(projected: Tensor, state: State, weight_hh: Tensor) -> State:
+class Weights(NamedTuple):
+    """What the LSTM learns. D is the width of its input."""
+
+    input: Tensor
+    """Shape: (4 H, D)."""
+    hidden: Tensor
+    """Shape: (4 H, H)."""
+    bias: Tensor
+    """Shape: (4 H,)."""
+
+
+def lstm_step(value: Tensor, state: State, weights: Weights) -> State:
     """Advance by one step; the new state is out of place.
 
     Args:
-        projected: What the input adds to the gates, biases included. Shape: (N, 4 H).
-        state: Hidden and cell state.
-        weight_hh: Recurrent weight. Shape: (4 H, H).
+        value: The input. Shape: (N, D).
+        state: Hidden and cell state before the step.
+        weights: The weights.
     """
     hidden, cell = state
-    gates = torch.addmm(projected, hidden, weight_hh.t())
-    input_gate, forget_gate, candidate, output_gate = gates.chunk(4, dim=-1)
-    cell = torch.sigmoid(forget_gate) * cell + torch.sigmoid(input_gate) * _tanh(candidate)
-    return torch.sigmoid(output_gate) * _tanh(cell), cell
-
-
-def _tanh(value: Tensor) -> Tensor:
-    if not value.is_cpu or torch.compiler.is_exporting():
-        return torch.tanh(value)
-    return 2.0 * torch.sigmoid(2.0 * value) - 1.0
+    gates = torch.addmm(weights.bias, value, weights.input.t())
+    in_place = has_fast_form(gates) and not torch.is_grad_enabled()
+    if not in_place:
+        gates = torch.addmm(gates, hidden, weights.hidden.t())
+        input_gate, forget_gate, candidate, output_gate = gates.chunk(4, dim=-1)
+        kept = torch.sigmoid(forget_gate) * cell
+        cell = kept + torch.sigmoid(input_gate) * _tanh(candidate)
+        return torch.sigmoid(output_gate) * _tanh(cell), cell
+    gates.addmm_(hidden, weights.hidden.t())
+    input_gate, forget_gate, half_candidate, output_gate = _activate_(gates)
+    candidate = half_candidate.mul_(2.0).sub_(1.0)
+    cell = (forget_gate * cell).add_(candidate.mul_(input_gate))
+    return (2.0 * cell).sigmoid_().mul_(2.0).sub_(1.0).mul_(output_gate), cell
 
 
 def lstm_sequence(
-    projected: Tensor, state: State, starts: Tensor, weight_hh: Tensor
+    values: Tensor, state: State, starts: Tensor, weights: Weights
 ) -> tuple[Tensor, Tensor]:
-    """Advance by a sequence of steps, differentiably.
+    """Advance by a sequence of steps, differentiably, but once only.
 
     Args:
-        projected: What the inputs add to the gates, biases included. Shape: (T, N, 4 H).
+        values: The inputs. Shape: (T, N, D).
         state: Hidden and cell state before the first step.
         starts: Where the state is zeroed before the step. Shape: (T, N), bool.
-        weight_hh: Recurrent weight. Shape: (4 H, H).
+        weights: The weights.
 
     Returns:
         The hidden states after each step, shape (T, N, H), and the last cell state, shape (N, H).
     """
-    return _Sequence.apply(projected, *state, starts[..., None], weight_hh)
+    return _Sequence.apply(values, *state, starts[..., None], *weights)
+
+
+def _tanh(value: Tensor) -> Tensor:
+    return 2.0 * torch.sigmoid(2.0 * value) - 1.0 if has_fast_form(value) else torch.tanh(value)
+
+
+def _activate_(gates: Tensor) -> tuple[Tensor, ...]:
+    """Activate gates in place and return each; of the candidate it is half of 1 + tanh."""
+    parts = gates.chunk(4, dim=-1)
+    parts[2].mul_(2.0)
+    gates.sigmoid_()  # all four at once
+    return parts
 
 
 class _Sequence(torch.autograd.Function):
@@ -68,44 +96,50 @@ class _Sequence(torch.autograd.Function):
     @staticmethod
     def forward(
         ctx: Any,  # noqa: ANN401
-        projected: Tensor,
+        values: Tensor,
         hidden: Tensor,
         cell: Tensor,
         starts: Tensor,
+        weight_ih: Tensor,
         weight_hh: Tensor,
+        bias: Tensor,
     ) -> tuple[Tensor, Tensor]:
         """Return all hidden states and the last cell state, see `lstm_sequence`."""
-        width, zero = hidden.shape[-1], hidden.new_zeros(())
-        gates = torch.empty_like(projected)
-        hiddens = projected.new_empty((*projected.shape[:2], width))
+        shape, zero = values.shape[:2], hidden.new_zeros(())
+        gates = torch.addmm(bias, values.flatten(0, 1), weight_ih.t()).view(*shape, -1)
+        hiddens = values.new_empty((*shape, hidden.shape[-1]))
         hiddens_before, cells_before = torch.empty_like(hiddens), torch.empty_like(hiddens)
         candidates, cells_tanh = torch.empty_like(hiddens), torch.empty_like(hiddens)
         for step, gate in enumerate(gates):
             torch.where(starts[step], zero, hidden, out=hiddens_before[step])
             torch.where(starts[step], zero, cell, out=cells_before[step])
-            torch.addmm(projected[step], hiddens_before[step], weight_hh.t(), out=gate)
-            input_gate, forget_gate, half_candidate, output_gate = gate.chunk(4, dim=-1)
-            half_candidate.mul_(2.0)
-            gate.sigmoid_()  # all four at once; of the candidate, half of 1 + tanh
+            gate.addmm_(hiddens_before[step], weight_hh.t())
+            input_gate, forget_gate, half_candidate, output_gate = _activate_(gate)
             candidate = torch.mul(half_candidate, 2.0, out=candidates[step]).sub_(1.0)
             cell = (forget_gate * cells_before[step]).add_(input_gate * candidate)
             torch.sigmoid(2.0 * cell, out=cells_tanh[step]).mul_(2.0).sub_(1.0)
             hidden = torch.mul(output_gate, cells_tanh[step], out=hiddens[step])
         befores = hiddens_before, cells_before
-        ctx.save_for_backward(gates, *befores, candidates, cells_tanh, starts, weight_hh)
+        activated = gates, candidates, cells_tanh
+        ctx.save_for_backward(values, *befores, *activated, starts, weight_ih, weight_hh)
         return hiddens, cell
 
     @staticmethod
-    @once_differentiable
     def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
         ctx: Any,  # noqa: ANN401
         *grad_outputs: Tensor,
-    ) -> tuple[Tensor, Tensor, Tensor, None, Tensor]:
-        """Return the gradients of what `forward` was given."""
+    ) -> tuple[Tensor | None, ...]:
+        """Return the gradients of what `forward` was given.
+
+        Raises:
+            RuntimeError: If a second derivative is asked for.
+        """
+        refuse_second_derivative("an LSTM's sequence")
         hiddens_grad, cell_grad = grad_outputs
-        gates, hiddens_before, cells_before, candidates, cells_tanh, starts, weight_hh = (
-            ctx.saved_tensors
-        )
+        (values, hiddens_before, cells_before, gates, candidates, cells_tanh) = ctx.saved_tensors[
+            :6
+        ]
+        starts, weight_ih, weight_hh = ctx.saved_tensors[6:]
         gates_grad = torch.empty_like(gates)
         hidden_grad = torch.zeros_like(cell_grad)
         for step in reversed(range(len(gates))):
@@ -122,5 +156,7 @@ class _Sequence(torch.autograd.Function):
             _sigmoid_backward(grad, gates[step], grad_input=grad)
             cell_grad = (cell_grad * forget_gate).masked_fill_(starts[step], 0.0)
             hidden_grad = (grad @ weight_hh).masked_fill_(starts[step], 0.0)
-        weight_grad = gates_grad.flatten(0, 1).t() @ hiddens_before.flatten(0, 1)
-        return gates_grad, hidden_grad, cell_grad, None, weight_grad
+        values_grad = gates_grad @ weight_ih if ctx.needs_input_grad[0] else None
+        flat = gates_grad.flatten(0, 1)
+        weight_grads = flat.t() @ values.flatten(0, 1), flat.t() @ hiddens_before.flatten(0, 1)
+        return values_grad, hidden_grad, cell_grad, None, *weight_grads, flat.sum(dim=0)

@@ -1,4 +1,4 @@
-"""A perceptron as one operation, which works through its rows in buffers that stay in the caches.
+"""A perceptron as one operation, which works through its rows in buffers that stay in a cache.
 
 Layer by layer, every activation and gradient of a mini-batch is a new tensor of megabytes, and to
 pass them through memory takes PPO's update nearly as long as the products. Here a block of rows
@@ -14,39 +14,58 @@ from typing import Any
 
 import torch
 from torch import Tensor, nn
-from torch.autograd.function import once_differentiable
 
-from networks.elu import ELU, elu_backward, elu_into, has_fast_elu
+from networks.elu import ELU, elu_backward, elu_into, has_fast_form, refuse_second_derivative
 
 __all__ = ["perceptron"]
 
-_ROWS = 3072
-"""Rows of a block: more leave the caches, fewer make the products wait for their threads."""
+_BLOCK = 3072 * 128
+"""Entries of a block, its rows times its widest layer. With more, the three blocks of 1.5 MiB that
+are in use at a time leave the last cache (32 MiB, shared, where this was measured); with fewer,
+products wait for their threads."""
 
 
 def perceptron(layers: nn.Sequential, value: Tensor) -> Tensor:
-    """Return what layers make of rows; in blocks where they are a perceptron of ELUs on a CPU.
+    """Return what layers make of rows; as one operation where they are a perceptron on a CPU.
 
     Args:
-        layers: The layers.
+        layers: The layers. One operation they are if linear layers with biases alternate with ELUs,
+            none of which is hooked or of a type of its own.
         value: The rows; no gradient reaches them in blocks, so with one that should, they are not.
             Shape: (num_rows, in_features).
     """
-    linear = [layer for layer in layers if isinstance(layer, nn.Linear) and layer.bias is not None]
-    hidden = [layer for layer in layers if isinstance(layer, ELU)]
-    expected = [layer for pair in zip(linear, hidden, strict=False) for layer in pair] + linear[-1:]
-    in_blocks = has_fast_elu(value) and not value.requires_grad
-    if not in_blocks or list(layers) != expected:
+    is_alone = not value.requires_grad and not torch.is_autocast_enabled("cpu")
+    if value.ndim != 2 or not is_alone or not has_fast_form(value) or not _is_plain(layers):
         return layers(value)
-    parameters = [parameter for layer in linear for parameter in (layer.weight, layer.bias)]
-    return _Perceptron.apply(value, *parameters)
+    return _Perceptron.apply(value, *layers.parameters())  # weight and bias of each layer in turn
+
+
+def _is_plain(layers: nn.Sequential) -> bool:
+    linear, hidden = list(layers)[::2], list(layers)[1::2]
+    return (
+        len(linear) == len(hidden) + 1
+        and all(type(layer) is nn.Linear and layer.bias is not None for layer in linear)
+        and all(type(layer) is ELU for layer in hidden)
+        and not any(_is_hooked(module) for module in layers.modules())
+    )
+
+
+def _is_hooked(module: nn.Module) -> bool:
+    forward = module._forward_hooks or module._forward_pre_hooks
+    return bool(forward or module._backward_hooks or module._backward_pre_hooks)
+
+
+def _rows(num_rows: int, widths: Sequence[int]) -> list[slice]:
+    """Return the rows of each block."""
+    step = max(1, _BLOCK // max(widths))
+    return [slice(first, min(first + step, num_rows)) for first in range(0, num_rows, step)]
 
 
 class _Buffer:
     """Memory for a block of any width up to the largest, taken once."""
 
-    def __init__(self, widths: Sequence[int], like: Tensor) -> None:
-        self._memory = like.new_empty(_ROWS * max(widths, default=0))
+    def __init__(self, num_rows: int, widths: Sequence[int], like: Tensor) -> None:
+        self._memory = like.new_empty(min(_BLOCK, num_rows * max(widths)))
 
     def block(self, num_rows: int, width: int) -> Tensor:
         return self._memory[: num_rows * width].view(num_rows, width)
@@ -59,10 +78,10 @@ class _Perceptron(torch.autograd.Function):
     def forward(ctx: Any, value: Tensor, *parameters: Tensor) -> Tensor:  # noqa: ANN401
         """Return the last layer's output."""
         weights, biases = parameters[::2], parameters[1::2]
-        outputs = [value.new_empty(len(value), len(bias)) for bias in biases]
-        before = _Buffer([len(bias) for bias in biases[:-1]], value)
-        for first in range(0, len(value), _ROWS):
-            rows = slice(first, first + _ROWS)
+        widths = [len(bias) for bias in biases]
+        outputs = [value.new_empty(len(value), width) for width in widths]
+        before = _Buffer(len(value), widths, value)
+        for rows in _rows(len(value), widths):
             block = value[rows]
             for weight, bias, output in zip(weights[:-1], biases, outputs, strict=False):
                 buffer = before.block(len(block), len(bias))
@@ -72,20 +91,23 @@ class _Perceptron(torch.autograd.Function):
         return outputs[-1]
 
     @staticmethod
-    @once_differentiable
     def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
         ctx: Any,  # noqa: ANN401
         *grad_outputs: Tensor,
     ) -> tuple[Tensor | None, ...]:
-        """Return no gradient of the input, and those of the parameters."""
+        """Return no gradient of the input, and those of the parameters.
+
+        Raises:
+            RuntimeError: If a second derivative is asked for.
+        """
+        refuse_second_derivative("a perceptron")
         saved = ctx.saved_tensors
         inputs, weights = saved[: len(saved) // 2], saved[len(saved) // 2 :]
         weight_grads = [torch.zeros_like(weight) for weight in weights]
         bias_grads = [weight.new_zeros(len(weight)) for weight in weights]
-        widths = [weight.shape[1] for weight in weights[1:]]
-        buffers = _Buffer(widths, weights[0]), _Buffer(widths, weights[0])  # one is read meanwhile
-        for first in range(0, len(inputs[0]), _ROWS):
-            rows = slice(first, first + _ROWS)
+        num_rows, widths = len(inputs[0]), [len(weight) for weight in weights]
+        buffers = [_Buffer(num_rows, widths, weights[0]) for _ in range(2)]  # one is read meanwhile
+        for rows in _rows(num_rows, widths):
             grad = grad_outputs[0][rows]
             for layer in reversed(range(len(weights))):
                 block = inputs[layer][rows]

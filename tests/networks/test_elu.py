@@ -48,6 +48,18 @@ def test_its_gradient_in_float32_is_torchs():
     torch.testing.assert_close(*gradients)
 
 
+def test_its_second_derivative_is_the_numerical_one():
+    torch.manual_seed(0)
+    value = torch.randn(5, 3, dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradgradcheck(ELU(), value)
+
+
+def test_functional_transforms_go_through_it():
+    value = torch.linspace(-2.0, 2.0, 6)
+    slopes = torch.func.vmap(torch.func.grad(ELU()))(value)
+    torch.testing.assert_close(slopes, value.clamp(max=0.0).exp())
+
+
 @pytest.mark.parametrize("dtype", [torch.bfloat16, torch.float16])
 def test_in_half_precision_it_is_torchs(dtype):
     value = torch.randn(64).to(dtype)

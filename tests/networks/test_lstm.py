@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
-from torch.nn import functional
 
-from networks.lstm import lstm_sequence, lstm_step
+from networks.lstm import Weights, lstm_sequence, lstm_step
 
 NUM_STEPS, NUM_ENVS, OBS_DIM, WIDTH = 6, 5, 3, 4
 
@@ -24,8 +24,8 @@ def _make_inputs():
     return obs, starts, hidden, cell
 
 
-def _project(lstm, obs):
-    return functional.linear(obs, lstm.weight_ih, lstm.bias_ih + lstm.bias_hh)
+def _weights(lstm):
+    return Weights(lstm.weight_ih, lstm.weight_hh, lstm.bias_ih + lstm.bias_hh)
 
 
 def _torch_sequence(lstm, obs, starts, hidden, cell):
@@ -40,15 +40,53 @@ def _torch_sequence(lstm, obs, starts, hidden, cell):
 def test_a_step_is_that_of_torch():
     lstm = _make_cell()
     obs, _, hidden, cell = _make_inputs()
-    ours = lstm_step(_project(lstm, obs[0]), (hidden, cell), lstm.weight_hh)
-    torch.testing.assert_close(ours, lstm(obs[0], (hidden, cell)))
+    expected = lstm(obs[0], (hidden, cell))
+    before = [tensor.clone() for tensor in (obs, hidden, cell)]
+    learnt = lstm_step(obs[0], (hidden, cell), _weights(lstm))
+    with torch.no_grad():
+        acted = lstm_step(obs[0], (hidden, cell), _weights(lstm))
+    torch.testing.assert_close(learnt, expected)
+    torch.testing.assert_close(acted, expected)
+    assert all(map(torch.equal, (obs, hidden, cell), before))
+
+
+def test_a_step_in_single_precision_is_within_1e_6_of_the_exact_one():
+    lstm = _make_cell()
+    obs, _, hidden, cell = (3.0 * tensor for tensor in _make_inputs())
+    exact = lstm(obs[0], (hidden, cell))
+    weights = Weights(*(weight.float() for weight in _weights(lstm)))
+    with torch.no_grad():
+        ours = lstm_step(obs[0].float(), (hidden.float(), cell.float()), weights)
+    for one, other in zip(ours, exact, strict=True):
+        assert (one.double() - other).abs().max() < 1e-6
+
+
+def test_steps_are_those_of_the_sequence_bit_for_bit():
+    lstm = _make_cell().float()
+    obs, starts, hidden, cell = _make_inputs()
+    obs, state = obs.float(), (hidden.float(), cell.float())
+    with torch.no_grad():
+        hiddens, last_cell = lstm_sequence(obs, state, starts, _weights(lstm))
+        for value, start, expected in zip(obs, starts[..., None], hiddens, strict=True):
+            before = [part.masked_fill(start, 0.0) for part in state]
+            state = lstm_step(value, (before[0], before[1]), _weights(lstm))
+            assert torch.equal(state[0], expected)
+    assert torch.equal(state[1], last_cell)
+
+
+def test_a_gradient_of_a_sequences_gradient_is_refused():
+    lstm = _make_cell()
+    obs, starts, hidden, cell = _make_inputs()
+    hiddens, _ = lstm_sequence(obs, (hidden, cell), starts, _weights(lstm))
+    with pytest.raises(RuntimeError, match="an LSTM's sequence has no second derivative"):
+        torch.autograd.grad(hiddens.sum(), [*lstm.parameters()], create_graph=True)
 
 
 def test_a_sequence_and_all_its_gradients_are_those_of_torch():
     lstm = _make_cell()
     obs, starts, hidden, cell = _make_inputs()
     leaves = [tensor.requires_grad_() for tensor in (obs, hidden, cell)] + [*lstm.parameters()]
-    ours = lstm_sequence(_project(lstm, obs), (hidden, cell), starts, lstm.weight_hh)
+    ours = lstm_sequence(obs, (hidden, cell), starts, _weights(lstm))
     torch_own = _torch_sequence(lstm, obs, starts, hidden, cell)
     torch.testing.assert_close(ours, torch_own)
     weights = [torch.randn_like(output) for output in ours]
@@ -62,23 +100,23 @@ def test_a_sequence_and_all_its_gradients_are_those_of_torch():
 def test_the_gradient_of_a_sequence_is_that_of_finite_differences():
     lstm = _make_cell()
     obs, starts, hidden, cell = _make_inputs()
-    projected = _project(lstm, obs).detach().requires_grad_()
-    for state in (hidden, cell):
-        state.requires_grad_()
+    weights = [weight.detach().requires_grad_() for weight in _weights(lstm)]
+    for leaf in (obs, hidden, cell):
+        leaf.requires_grad_()
 
-    def sequence(projected, hidden, cell, weight):
-        return lstm_sequence(projected, (hidden, cell), starts, weight)
+    def sequence(obs, hidden, cell, *weights):
+        return lstm_sequence(obs, (hidden, cell), starts, Weights(*weights))
 
-    assert torch.autograd.gradcheck(sequence, (projected, hidden, cell, lstm.weight_hh))
+    assert torch.autograd.gradcheck(sequence, (obs, hidden, cell, *weights))
 
 
 def test_the_gradient_does_not_pass_a_start():
     lstm = _make_cell()
     obs, starts, hidden, cell = _make_inputs()
-    projected = _project(lstm, obs).detach().requires_grad_()
-    hiddens, _ = lstm_sequence(projected, (hidden, cell), starts, lstm.weight_hh)
+    obs.requires_grad_()
+    hiddens, _ = lstm_sequence(obs, (hidden, cell), starts, _weights(lstm))
     hiddens[-1].sum().backward()
-    assert projected.grad is not None
-    earlier = projected.grad[:-1].abs().sum(dim=(0, 2))
+    assert obs.grad is not None
+    earlier = obs.grad[:-1].abs().sum(dim=(0, 2))
     assert earlier[2] == 0.0  # it starts at the last step
     assert (earlier[[0, 1, 3, 4]] > 0.0).all()
