@@ -15,6 +15,7 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from envs.commands import CommandSampler
+from envs.curriculum import Curriculum, curriculum
 from envs.footfall import Footfalls
 from envs.observations import OBS_DIM, noise_amplitude, policy_observation, slices
 from envs.quadruped_env_cfg import QuadrupedEnvCfg
@@ -23,6 +24,7 @@ from envs.rewards import Motion, RewardSum
 from envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS, build_scene
 from envs.sensors import RobotSensors
 from envs.simulation import make_simulation
+from envs.step_log import curriculum_log, episode_log, gait_log
 from envs.terrain import FlatTerrain, Terrain
 
 __all__ = ["NUM_ACTIONS", "QuadrupedEnv"]
@@ -132,7 +134,9 @@ class QuadrupedEnv(VecEnv):
         self.episode_length_buf += 1
         self._read_state()
         terminated = self._terminated()
-        reward, shares = self.reward_sum(self._motion(), self.quiet, self.lift, self.guide)
+        factors = self.curriculum
+        motion = self._motion()
+        reward, shares = self.reward_sum(motion, factors.quiet, factors.lift, factors.guide)
         time_outs = (self.episode_length_buf >= self.max_episode_length) & ~terminated
         dones = terminated | time_outs
         # What an unstable simulation did is not the policy's merit or fault.
@@ -148,26 +152,9 @@ class QuadrupedEnv(VecEnv):
     # -- what others may set or read -------------------------------------------------------------
 
     @property
-    def quiet(self) -> float:
-        """Curriculum factor in [0, 1] on the phase rewards, from the time trained so far."""
-        return self._ramp(self.cfg.rewards.quiet_ramp)
-
-    @property
-    def lift(self) -> float:
-        """Curriculum factor in [0, 1] on the rewards that hold the feet up."""
-        return self._ramp(self.cfg.rewards.lift_ramp)
-
-    @property
-    def guide(self) -> float:
-        """Curriculum factor in [0, 1] on the rewards that lead to a first walk."""
-        return 1.0 - self._ramp(self.cfg.rewards.guide_ramp)
-
-    def _ramp(self, bounds: tuple[float, float]) -> float:
-        start, end = bounds
-        elapsed = self.step_count * self.step_dt
-        if elapsed >= end:
-            return 1.0
-        return max(0.0, (elapsed - start) / (end - start))
+    def curriculum(self) -> Curriculum:
+        """Factors that change with the time trained so far."""
+        return curriculum(self.cfg, self.step_count)
 
     def set_estimated_phase(self, phase: torch.Tensor) -> None:
         """Hand over the phase estimated from o_t, before the step that it shapes the reward of.
@@ -333,7 +320,7 @@ class QuadrupedEnv(VecEnv):
             qpos[:, 3:7] = torch.where(column, heading, qpos[:, 3:7])
         simulation.ctrl[:] = torch.where(column, self.stand, simulation.ctrl)
         self._lift_to_ground(mask)
-        self.commands.resample(mask, True, self._ramp(self.cfg.commands.ramp))
+        self.commands.resample(mask, True, self.curriculum.commands)
         self.footfalls.reset(mask, self._sensors.foot_contact)
         for name in ("action", "last_action", "action_before_last", "last_joint_vel"):
             setattr(self, name, getattr(self, name).masked_fill(column, 0.0))
@@ -352,7 +339,7 @@ class QuadrupedEnv(VecEnv):
         interval = max(1, round(self.cfg.commands.resampling_time / self.step_dt))
         due = (age % interval == 0) & ~dones & (age > 0)
         if bool(due.any()):
-            self.commands.resample(due, False, self._ramp(self.cfg.commands.ramp))
+            self.commands.resample(due, False, self.curriculum.commands)
         cfg = self.cfg.randomization
         if not (cfg.enabled and cfg.push_interval > 0.0):
             return
@@ -395,31 +382,12 @@ class QuadrupedEnv(VecEnv):
     def _log(
         self, shares: dict[str, torch.Tensor], terminated: torch.Tensor, time_outs: torch.Tensor
     ) -> dict[str, torch.Tensor]:
-        """Return a new dictionary of scalars; what did not happen in this step is left out."""
-        log = {f"Reward/{name}": share for name, share in shares.items()}
-        command = self.commands.command
-        error = (command[:, :2] - self.base_lin_vel[:, :2]).square().sum(dim=1)
-        log["Gait/velocity_error_sq"] = error.mean()
-        log["Gait/power"] = self.power.mean()
-        log["Gait/duty_factor"] = self.footfalls.contact_share.mean()
-        beta = command[:, 3]
-        for name, chosen in (("low_beta", beta < 0.25), ("high_beta", beta > 0.75)):
-            landed = self.footfalls.touchdown & chosen.unsqueeze(1)
-            if bool(landed.any()):
-                log[f"Gait/landing_speed_{name}"] = self.footfalls.landing_speed[landed].mean()
-                log[f"Gait/apex_{name}"] = self.footfalls.swing_apex[landed].mean()
-        finished = terminated | time_outs
-        if bool(finished.any()):
-            log["Episode/fall_rate"] = terminated.sum() / finished.sum()
-        log["Episode/unstable"] = self.unstable.sum().float()
-        for name, share in (
-            ("quiet", self.quiet),
-            ("lift", self.lift),
-            ("guide", self.guide),
-            ("commands", self._ramp(self.cfg.commands.ramp)),
-        ):
-            log[f"Curriculum/{name}"] = torch.full((), share, device=self.device)
-        return log
+        return {
+            **{f"Reward/{name}": share for name, share in shares.items()},
+            **gait_log(self.commands.command, self.base_lin_vel, self.power, self.footfalls),
+            **episode_log(terminated, time_outs, self.unstable),
+            **curriculum_log(self.curriculum, self.device),
+        }
 
     def _draw(self, *shape: int) -> torch.Tensor:
         """Return random numbers in [0, 1)."""

@@ -432,16 +432,16 @@ def test_intervals_below_a_control_step_act_in_every_step():
 
 def test_quiet_grows_with_the_simulated_time():
     env = _make_env(1, rewards=RewardsCfg(quiet_ramp=(0.04, 0.12)))
-    quiet = [env.quiet]
+    quiet = [env.curriculum.quiet]
     for _ in range(7):
         log = _stand_still(env)[3]["log"]
-        quiet.append(env.quiet)
-        assert log["Curriculum/quiet"].item() == pytest.approx(env.quiet)
+        quiet.append(env.curriculum.quiet)
+        assert log["Curriculum/quiet"].item() == pytest.approx(env.curriculum.quiet)
     assert quiet == pytest.approx([0.0, 0.0, 0.0, 0.25, 0.5, 0.75, 1.0, 1.0])
 
 
 def test_without_a_ramp_quiet_is_full_from_the_start():
-    assert _make_env(1).quiet == 1.0
+    assert _make_env(1).curriculum.quiet == 1.0
 
 
 def test_the_guide_leaves_the_reward_with_the_simulated_time():
@@ -450,19 +450,19 @@ def test_the_guide_leaves_the_reward_with_the_simulated_time():
     env.set_command(torch.tensor([0.5, 0.0, 0.0, 0.0]))
     hips_out = torch.zeros(1, 12)
     hips_out[0, [1, 2, 10, 11]] = torch.tensor([4.0, -4.0, 4.0, -4.0])  # FR and RL drawn up
-    guide, shares = [env.guide], []
+    guide, shares = [env.curriculum.guide], []
     for _ in range(7):
         log = env.step(hips_out)[3]["log"]
-        guide.append(env.guide)
+        guide.append(env.curriculum.guide)
         shares.append(log["Reward/diagonal_support"].item())
-        assert log["Curriculum/guide"].item() == pytest.approx(env.guide)
+        assert log["Curriculum/guide"].item() == pytest.approx(env.curriculum.guide)
     assert guide == pytest.approx([1.0, 1.0, 1.0, 0.75, 0.5, 0.25, 0.0, 0.0])
     assert shares[3] > 0.1
     assert shares[-1] == 0.0
 
 
 def test_without_a_ramp_there_is_no_guide():
-    assert _make_env(1).guide == 0.0
+    assert _make_env(1).curriculum.guide == 0.0
 
 
 @pytest.mark.parametrize(("source", "differs"), [("estimated", True), ("true", False)])
