@@ -278,7 +278,7 @@ class QuadrupedEnv(VecEnv):
             action=self.action,
             last_action=self.last_action,
             action_before_last=self.action_before_last,
-            collisions=(self._sensors.link_contact > 0.0).sum(dim=1).float(),
+            collisions=(self._sensors.shape_contact > 0.0).sum(dim=1).float(),
             phase=self._estimated_phase if estimated else feet.phase,
             foot_drop_sq=feet.drop_sq,
             foot_raise_sq=feet.raise_sq,

@@ -47,8 +47,8 @@ class RobotSensors:
         """Number of contacts of each foot. Shape: (num_envs, 4)."""
         self.trunk_contact = now("trunk_contact", _NUM_TRUNK_SHAPES)
         """Number of contacts of trunk and head. Shape: (num_envs, 2)."""
-        self.link_contact = now("trunk_contact", _NUM_SHAPES)
-        """Number of contacts of every link but the feet. Shape: (num_envs, 14)."""
+        self.shape_contact = now("trunk_contact", _NUM_SHAPES)
+        """Number of contacts of every collision shape but the feet. Shape: (num_envs, 14)."""
         self.foot_vel_z_history = past(f"{LEGS[0]}_foot_vel")[..., 2]
         """Vertical velocity of each foot at the last physics steps, the oldest first, m/s.
         Shape: (foot_samples, num_envs, 4)."""

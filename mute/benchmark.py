@@ -77,6 +77,8 @@ class Rates:
 
     num_envs: int
     """Number of environments."""
+    rollouts: int
+    """Turns that were timed."""
     engine: float
     """mjbatch alone: the physics steps of a control step in one call, the same model."""
     environment: float
@@ -137,7 +139,8 @@ def measure(task: str, num_envs: int, rollouts: int) -> Rates:
         for name, each in times.items()
         if name != "engine"
     }
-    return Rates(num_envs=num_envs, **rates, **over_engine, peak_memory_mb=peak_memory_mb())
+    measured = rates | over_engine | {"peak_memory_mb": peak_memory_mb()}
+    return Rates(num_envs=num_envs, rollouts=rollouts, **measured)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -78,5 +78,5 @@ def _check_against_mujoco(simulation, sensors):
             for i in range(simulation.model.nsensor)
             if data.sensor(i).name.endswith("_contact") and "foot" not in data.sensor(i).name
         ]
-        assert sensors.link_contact[robot].tolist() == links
+        assert sensors.shape_contact[robot].tolist() == links
         assert sensors.trunk_contact[robot].tolist() == links[:2]
