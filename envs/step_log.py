@@ -14,7 +14,7 @@ __all__ = ["curriculum_log", "episode_log", "gait_log"]
 def gait_log(
     command: Tensor, base_lin_vel: Tensor, power: Tensor, footfalls: Footfalls
 ) -> dict[str, Tensor]:
-    """Return how well the robots follow their commands, and how they land by quiet factor.
+    """Return how well the robots follow their commands, and how they land at low and high beta.
 
     Args:
         command: (v_x, v_y, w_z, beta). Shape: (num_envs, 4).

@@ -53,9 +53,9 @@ class PreparedModel(MLPModel):
         if self.obs_normalization:
             self.obs_normalizer = RunningNormalization(self.obs_dim)
         for place, layer in enumerate(self.mlp):
-            if isinstance(layer, nn.ELU) and layer.alpha == 1.0:
+            if isinstance(layer, nn.ELU):  # rsl_rl's has the default alpha
                 self.mlp[place] = ELU()
-            elif isinstance(layer, nn.ELU | nn.ReLU | nn.SELU):
+            elif isinstance(layer, nn.ReLU | nn.SELU):
                 layer.inplace = True
 
     def tie(self, source: Reflection, target: Reflection) -> None:

@@ -38,8 +38,8 @@ def has_fast_form(value: Tensor) -> bool:
 def refuse_second_derivative(what: str) -> None:
     """Raise where a backward pass is itself recorded.
 
-    torch's `once_differentiable` lets such a pass through if nothing that follows needs its result,
-    and a gradient penalty is then wrong without a word.
+    torch's `once_differentiable` raises only where its result is differentiated on the way to what
+    is asked for: a gradient penalty is wrong without a word.
 
     Raises:
         RuntimeError: If gradients are recorded.

@@ -226,7 +226,8 @@ class Estimator(nn.Module):
         self, hidden: Tensor, sample: bool = False, generator: torch.Generator | None = None
     ) -> Estimate:
         """Turn hidden states, shape (., lstm_hidden), into an estimate."""
-        # One product for all heads: each has too few outputs to keep a processor busy.
+        # One product for all heads, of which the weights alone are read: each has too few outputs
+        # to keep a processor busy.
         heads = self.heights_head, self.base_lin_vel_head, self.latent_mean_head
         heads = *heads, self.latent_log_var_head
         weight = torch.cat([head.weight for head in heads])

@@ -3,8 +3,8 @@
 Gates lie in torch's order i, f, g, o. Where activations have their fast form (see `networks.elu`),
 tanh x is 2 sigmoid(2 x) - 1, which takes torch a third of the time on a CPU and differs from it by
 2e-7 at most; a sequence has it everywhere. Autograd's own gradient of a sequence makes some twenty
-small tensors a step and two products a step for the weights; the one written out here fills one
-buffer of gates, and has one product for all steps.
+small tensors a step and a product a step for each weight; the one written out here fills one
+buffer of gates, and has a single product for each.
 
 Source: Hochreiter and Schmidhuber, 1997; Gers et al., 2000 (forget gate).
 """
@@ -106,7 +106,7 @@ class _Sequence(torch.autograd.Function):
     ) -> tuple[Tensor, Tensor]:
         """Return all hidden states and the last cell state, see `lstm_sequence`."""
         shape, zero = values.shape[:2], hidden.new_zeros(())
-        gates = torch.addmm(bias, values.flatten(0, 1), weight_ih.t()).view(*shape, -1)
+        gates = torch.addmm(bias, values.flatten(0, 1), weight_ih.t()).view(*shape, len(bias))
         hiddens = values.new_empty((*shape, hidden.shape[-1]))
         hiddens_before, cells_before = torch.empty_like(hiddens), torch.empty_like(hiddens)
         candidates, cells_tanh = torch.empty_like(hiddens), torch.empty_like(hiddens)

@@ -42,3 +42,12 @@ def test_half_of_the_way_is_half_of_the_factor():
 
 def test_without_ramps_everything_is_there_from_the_start_and_no_guide():
     assert curriculum(_make_cfg(), 0) == (1.0, 1.0, 0.0, 1.0)
+
+
+def test_each_factor_has_a_ramp_of_its_own():
+    rewards = RewardsCfg(quiet_ramp=(0.0, 10.0), lift_ramp=(0.0, 20.0), guide_ramp=(0.0, 40.0))
+    cfg = QuadrupedEnvCfg(num_envs=1, rewards=rewards, commands=CommandsCfg(ramp=(0.0, 100.0)))
+    factors = curriculum(cfg, round(5.0 / cfg.step_dt))
+    assert factors._asdict() == pytest.approx(
+        {"quiet": 0.5, "lift": 0.25, "guide": 0.875, "commands": 0.05}
+    )

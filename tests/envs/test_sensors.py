@@ -73,10 +73,10 @@ def _check_against_mujoco(simulation, sensors):
             for quantity in ("foot_pos", "foot_vel", "foot_contact"):
                 reading = getattr(sensors, quantity)[robot, i].flatten().tolist()
                 assert reading == data.sensor(f"{leg}_{quantity}").data.tolist()
-        links = [
+        shapes = [
             float(data.sensor(i).data[0])
             for i in range(simulation.model.nsensor)
             if data.sensor(i).name.endswith("_contact") and "foot" not in data.sensor(i).name
         ]
-        assert sensors.shape_contact[robot].tolist() == links
-        assert sensors.trunk_contact[robot].tolist() == links[:2]
+        assert sensors.shape_contact[robot].tolist() == shapes
+        assert sensors.trunk_contact[robot].tolist() == shapes[:2]

@@ -28,7 +28,7 @@ def test_the_benchmark_prints_the_rates_of_every_part_as_json(capsys):
     assert benchmark.main(["--num-envs", "4", "--rollouts", "1", "--json", *peers]) == 0
     content = json.loads(capsys.readouterr().out)
     (rates,) = content["rates"]
-    assert rates["num_envs"] == 4
+    assert (rates["num_envs"], rates["rollouts"]) == (4, 1)
     parts = [rates[name] for name in ("engine", "environment", "collection", "learning", "loop")]
     assert all(rate > 0.0 for rate in parts)
     # The loop is collection and learning, one after the other.

@@ -44,6 +44,27 @@ def test_one_step_of_a_tiny_network_is_the_hand_computed_one():
     assert hidden.item() == pytest.approx(sigmoid(1.64) * math.tanh(expected_cell), abs=1e-6)
 
 
+def test_an_estimate_is_what_each_head_says_of_the_hidden_state():
+    estimator = _make_estimator()
+    cfg = estimator.cfg
+    with torch.no_grad():
+        estimator.latent_log_var_head.bias.copy_(torch.tensor([-30.0, 0.0, 0.1, 30.0]))
+    obs, state, _ = _make_sequence()
+    estimate, (hidden, _) = estimator.step(obs[0], state)
+    heights, velocity = estimator.heights_head(hidden), estimator.base_lin_vel_head(hidden)
+    mean = estimator.latent_mean_head(hidden)
+    phase = estimator.phase_network(torch.cat((heights, velocity, mean), dim=-1)).sigmoid()
+    close = torch.testing.assert_close
+    close(estimate.base_lin_vel, velocity)
+    close(estimate.heights, cfg.height_offset + cfg.height_scale * heights)
+    close(estimate.latent_mean, mean)
+    close(estimate.latent, mean)
+    close(estimate.latent_log_var, estimator.latent_log_var_head(hidden).clamp(-10.0, 5.0))
+    assert estimate.latent_log_var[:, 0].tolist() == [-10.0] * NUM_ENVS
+    assert estimate.latent_log_var[:, 3].tolist() == [5.0] * NUM_ENVS
+    close(estimate.phase, phase)
+
+
 def test_unrolling_a_sequence_agrees_with_stepping_through_it():
     estimator = _make_estimator()
     obs, state, starts = _make_sequence()

@@ -61,7 +61,7 @@ def test_a_step_in_single_precision_is_within_1e_6_of_the_exact_one():
         assert (one.double() - other).abs().max() < 1e-6
 
 
-def test_steps_are_those_of_the_sequence_bit_for_bit():
+def test_steps_are_those_of_the_sequence():
     lstm = _make_cell().float()
     obs, starts, hidden, cell = _make_inputs()
     obs, state = obs.float(), (hidden.float(), cell.float())
@@ -70,8 +70,17 @@ def test_steps_are_those_of_the_sequence_bit_for_bit():
         for value, start, expected in zip(obs, starts[..., None], hiddens, strict=True):
             before = [part.masked_fill(start, 0.0) for part in state]
             state = lstm_step(value, (before[0], before[1]), _weights(lstm))
-            assert torch.equal(state[0], expected)
-    assert torch.equal(state[1], last_cell)
+            torch.testing.assert_close(state[0], expected, atol=1e-6, rtol=0.0)
+    torch.testing.assert_close(state[1], last_cell, atol=1e-6, rtol=0.0)
+
+
+def test_a_sequence_of_no_robots_is_empty():
+    lstm = _make_cell()
+    obs, starts, hidden, cell = _make_inputs()
+    state = (hidden[:0], cell[:0])
+    hiddens, last_cell = lstm_sequence(obs[:, :0], state, starts[:, :0], _weights(lstm))
+    assert hiddens.shape == (NUM_STEPS, 0, WIDTH)
+    assert last_cell.shape == (0, WIDTH)
 
 
 def test_a_gradient_of_a_sequences_gradient_is_refused():

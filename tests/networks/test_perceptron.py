@@ -18,9 +18,13 @@ NUM_ROWS, WIDTHS = 26, (7, 16, 24, 8, 3)
 
 
 @pytest.fixture(autouse=True)
-def _blocks_of_8_rows(monkeypatch):
-    # Three whole blocks, and one that is cut off.
-    monkeypatch.setattr(module, "_BLOCK", 8 * max(WIDTHS))
+def _small_blocks(monkeypatch):
+    _set_rows_of_a_block(monkeypatch, WIDTHS)
+
+
+def _set_rows_of_a_block(monkeypatch, widths):
+    # Three whole blocks of 8 rows, and one that is cut off.
+    monkeypatch.setattr(module, "_BLOCK", 8 * max(widths[1:]))
 
 
 def _make_layers(activation: type[nn.Module] = ELU, widths=WIDTHS, **factory):
@@ -45,7 +49,8 @@ def _assert_as_its_layers(layers, value, weight):
 
 
 @pytest.mark.parametrize("widths", [WIDTHS, (7, 3), (7, 16, 3)])
-def test_outputs_and_gradients_are_those_of_the_layers(widths):
+def test_outputs_and_gradients_are_those_of_the_layers(widths, monkeypatch):
+    _set_rows_of_a_block(monkeypatch, widths)
     layers = _make_layers(widths=widths)
     value = 3.0 * torch.randn(NUM_ROWS, widths[0])
     _assert_as_its_layers(layers, value, torch.randn(NUM_ROWS, widths[-1]))
@@ -80,6 +85,20 @@ def test_it_gives_the_same_where_nothing_is_learnt(mode):
     with mode():
         output = perceptron(layers, value)
     assert torch.equal(output, perceptron(layers, value))
+    torch.testing.assert_close(output, layers(value))
+
+
+def test_layers_may_share_their_weights():
+    one, other = nn.Linear(6, 6), nn.Linear(6, 6)
+    other.weight = one.weight
+    value = torch.randn(NUM_ROWS, 6)
+    for layers in (nn.Sequential(one, ELU(), one), nn.Sequential(one, ELU(), other)):
+        _assert_as_its_layers(layers, value, torch.randn(NUM_ROWS, 6))
+
+
+def test_a_layer_wider_than_a_block_goes_row_by_row(monkeypatch):
+    monkeypatch.setattr(module, "_BLOCK", 5)
+    _assert_as_its_layers(_make_layers(), torch.randn(3, WIDTHS[0]), torch.randn(3, WIDTHS[-1]))
 
 
 def test_a_gradient_of_its_gradient_is_refused():
