@@ -2,9 +2,11 @@
 
 Every part is timed in one process and in turns with the bare engine, and compared with its rollout
 of the same turn, so that a machine whose speed drifts does not favour one of them: a share is the
-median over turns, not the quotient of two rates. In all parts robots stand and are shaken by noise
-of the same deviation, less than a training begins with: what falls over takes longer to simulate,
-whatever steps it. Each size runs in a process of its own, for its memory.
+median over turns, not the quotient of two rates. A training begins, with less noise than usual.
+Engine and environment then do each of its rollouts again, alone, with the same robots from the same
+states with the same actions: what kneels, carries more or rubs takes longer to simulate, whatever
+steps it. How fast the engine is with nominal robots that stand is told beside. Each size runs in a
+process of its own, for its memory.
 `--peers` times other ways to step a Go1 after that, see `mute.peers`.
 """
 
@@ -44,7 +46,7 @@ from mute.tasks import DEFAULT_TASK, make_task
 __all__ = ["BenchmarkArgs", "Rates", "measure"]
 
 _ACTION_STD = 0.4
-"""Standard deviation of the actions in every part."""
+"""Standard deviation of the actions that the training begins with."""
 
 
 @dataclass
@@ -80,9 +82,11 @@ class Rates:
     rollouts: int
     """Turns that were timed."""
     engine: float
-    """mjbatch alone: the physics steps of a control step in one call, the same model."""
+    """mjbatch alone: the physics steps of a control step in one call, of the training's robots."""
+    nominal_engine: float
+    """The same of robots without randomisation that stand, shaken by noise."""
     environment: float
-    """The environment, with random actions."""
+    """The environment alone, with the training's robots and actions."""
     collection: float
     """The environment with estimator and actor-critic in its loop."""
     learning: float
@@ -116,16 +120,21 @@ def measure(task: str, num_envs: int, rollouts: int) -> Rates:
     torch.set_float32_matmul_precision(cfg.agent.matmul_precision)
     runner = MuteRunner(task, cfg, None)
     steps = cfg.agent.num_steps_per_env
+    collect, replay = _collection(runner, steps), _Replay(runner.env.env)
     parts = {
-        "engine": _engine(runner.env.env, steps),
-        "environment": _environment(QuadrupedEnv(cfg.env), steps),
-        "collection": _collection(runner, steps),
+        "collection": collect,
+        "engine": replay.engine,
+        "environment": replay.environment,
+        "nominal_engine": _nominal_engine(runner.env.env, steps),
         "learning": runner.alg.update,
     }
     runner.alg.train_mode()
     times: dict[str, list[float]] = {name: [] for name in parts}
     for rollout in range(rollouts + 1):
+        before = runner.env.env.state_dict()
         for name, part in parts.items():
+            if name == "engine":
+                replay.load(before, runner.alg.storage.actions)
             (use_learning_threads if name == "learning" else use_collection_threads)()
             start = time.perf_counter()
             part()
@@ -137,7 +146,7 @@ def measure(task: str, num_envs: int, rollouts: int) -> Rates:
     over_engine = {
         f"{name}_over_engine": _median_ratio(times["engine"], each)
         for name, each in times.items()
-        if name != "engine"
+        if not name.endswith("engine")
     }
     measured = rates | over_engine | {"peak_memory_mb": peak_memory_mb()}
     return Rates(num_envs=num_envs, rollouts=rollouts, **measured)
@@ -192,7 +201,47 @@ def _median_ratio(engine: Sequence[float], part: Sequence[float]) -> float:
     return statistics.median(one / other for one, other in zip(engine, part, strict=True))
 
 
-def _engine(env: QuadrupedEnv, steps: int) -> Callable[[], None]:
+class _Replay:
+    """A rollout that a training's robots have done, done again by engine or environment alone."""
+
+    def __init__(self, env: QuadrupedEnv) -> None:
+        """Make the same robots twice; `env` is the training's."""
+        self._env = QuadrupedEnv(env.cfg)
+        self._batch = Batch(env.model, env.num_envs)
+        self._ctrl, self._state = self._batch.bind("ctrl"), self._batch.bind("state")
+        for key, value in env.simulation.state_dict().items():
+            if key.startswith("field/"):
+                self._batch.expand(key.removeprefix("field/"))[:] = value.numpy()
+        self._batch.set_const()
+
+    def load(self, before: dict[str, Any], actions: torch.Tensor) -> None:
+        """Go to where a rollout began.
+
+        Args:
+            before: The environment's state there.
+            actions: Actions of the rollout. Shape: (num_steps, num_envs, 12).
+        """
+        env = self._env
+        env.load_state_dict(before)
+        self._state[:] = before["simulation"]["integration"].numpy()
+        self._actions = actions.clone()
+        clipped = self._actions.clamp(-env.cfg.action_clip, env.cfg.action_clip)
+        self._targets = (env.stand + env.cfg.action_scale * clipped).double().numpy()
+
+    def engine(self) -> None:
+        """Step the physics; what fell stays down."""
+        for target in self._targets:
+            self._ctrl[:] = target
+            self._batch.step(nstep=self._env.cfg.decimation)
+
+    @torch.inference_mode()
+    def environment(self) -> None:
+        """Step the environment."""
+        for action in self._actions:
+            self._env.step(action)
+
+
+def _nominal_engine(env: QuadrupedEnv, steps: int) -> Callable[[], None]:
     batch = Batch(env.model, env.num_envs)
     ctrl = batch.bind("ctrl")
     batch.reset(keyframe=env.model.key("stand").id)
@@ -203,17 +252,6 @@ def _engine(env: QuadrupedEnv, steps: int) -> Callable[[], None]:
         for target in targets:
             ctrl[:] = target
             batch.step(nstep=env.cfg.decimation)
-
-    return run
-
-
-def _environment(env: QuadrupedEnv, steps: int) -> Callable[[], None]:
-    actions = _ACTION_STD * torch.randn(steps, env.num_envs, NUM_ACTIONS)
-
-    @torch.inference_mode()
-    def run() -> None:
-        for action in actions:
-            env.step(action)
 
     return run
 

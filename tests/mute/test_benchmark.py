@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import venv
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from mjbatch import Batch
 
-from envs.quadruped_env import NUM_ACTIONS
+from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
 from envs.scene import STAND_JOINT_POS, build_scene
 from mute import benchmark, provenance
 from mute.errors import MuteError
@@ -29,7 +31,8 @@ def test_the_benchmark_prints_the_rates_of_every_part_as_json(capsys):
     content = json.loads(capsys.readouterr().out)
     (rates,) = content["rates"]
     assert (rates["num_envs"], rates["rollouts"]) == (4, 1)
-    parts = [rates[name] for name in ("engine", "environment", "collection", "learning", "loop")]
+    names = ("engine", "nominal_engine", "environment", "collection", "learning", "loop")
+    parts = [rates[name] for name in names]
     assert all(rate > 0.0 for rate in parts)
     # The loop is collection and learning, one after the other.
     assert 1.0 / rates["loop"] == pytest.approx(1.0 / rates["collection"] + 1.0 / rates["learning"])
@@ -48,6 +51,26 @@ def test_the_benchmark_prints_the_rates_of_every_part_as_json(capsys):
         "steps_per_second": None,
         "note": "/nowhere/python does not start: No such file or directory",
     }
+
+
+def test_engine_and_environment_do_again_what_the_training_did():
+    task = make_task(DEFAULT_TASK)
+    cfg = dataclasses.replace(task.env, num_envs=3)
+    env = QuadrupedEnv(cfg)
+    replay = benchmark._Replay(env)
+    actions = 0.5 * torch.randn(20, 3, NUM_ACTIONS)
+    for _ in range(2):  # the second one starts where the first one ended
+        before = env.state_dict()
+        for action in actions:
+            env.step(action)
+        replay.load(before, actions)
+        replay.engine()
+        replay.environment()
+        assert torch.equal(replay._env.simulation.qpos, env.simulation.qpos)
+        # Resets and pushes are the environment's; nothing falls within 0.8 s.
+        qpos = torch.from_numpy(replay._batch.bind("qpos")).float()
+        torch.testing.assert_close(qpos, env.simulation.qpos, atol=1e-4, rtol=1e-4)
+    assert (replay._env.physics == env.physics).all()
 
 
 def test_a_part_is_compared_with_the_engine_turn_by_turn():
