@@ -225,11 +225,15 @@ class _Replay:
         env.load_state_dict(before)
         self._state[:] = before["simulation"]["integration"].numpy()
         self._actions = actions.clone()
-        clipped = self._actions.clamp(-env.cfg.action_clip, env.cfg.action_clip)
+        clip = env.cfg.action_clip
+        clipped = torch.nan_to_num(self._actions).clamp(-clip, clip)  # as the environment does
         self._targets = (env.stand + env.cfg.action_scale * clipped).double().numpy()
 
     def engine(self) -> None:
-        """Step the physics; what fell stays down."""
+        """Step the physics alone: what falls stays down, and pushes are left out.
+
+        In the first rollouts of a training, which are timed, hardly a robot falls.
+        """
         for target in self._targets:
             self._ctrl[:] = target
             self._batch.step(nstep=self._env.cfg.decimation)
