@@ -232,7 +232,7 @@ class _Replay:
     def engine(self) -> None:
         """Step the physics alone: what falls stays down, and pushes are left out.
 
-        In the first rollouts of a training, which are timed, hardly a robot falls.
+        In the first rollouts of a training, which are timed, hardly a robot falls or is pushed.
         """
         for target in self._targets:
             self._ctrl[:] = target
