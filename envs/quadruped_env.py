@@ -141,7 +141,7 @@ class QuadrupedEnv(VecEnv):
         dones = terminated | time_outs
         # What an unstable simulation did is not the policy's merit or fault.
         reward = torch.where(self.unstable, 0.0, reward)
-        log = self._log(shares, terminated, time_outs)
+        log = self._log(shares, factors, terminated, time_outs)
         if self.autoreset and bool(dones.any()):
             self._reset(dones)
         self._resample_and_push(dones)
@@ -380,13 +380,17 @@ class QuadrupedEnv(VecEnv):
         )
 
     def _log(
-        self, shares: dict[str, torch.Tensor], terminated: torch.Tensor, time_outs: torch.Tensor
+        self,
+        shares: dict[str, torch.Tensor],
+        factors: Curriculum,
+        terminated: torch.Tensor,
+        time_outs: torch.Tensor,
     ) -> dict[str, torch.Tensor]:
         return {
             **{f"Reward/{name}": share for name, share in shares.items()},
             **gait_log(self.commands.command, self.base_lin_vel, self.power, self.footfalls),
             **episode_log(terminated, time_outs, self.unstable),
-            **curriculum_log(self.curriculum, self.device),
+            **curriculum_log(factors, self.device),
         }
 
     def _draw(self, *shape: int) -> torch.Tensor:

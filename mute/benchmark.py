@@ -201,18 +201,46 @@ def _median_ratio(engine: Sequence[float], part: Sequence[float]) -> float:
     return statistics.median(one / other for one, other in zip(engine, part, strict=True))
 
 
+class _Physics:
+    """mjbatch alone: control steps of robots whose set points are given."""
+
+    def __init__(self, env: QuadrupedEnv) -> None:
+        """Make nominal robots of the model of an environment."""
+        self._env = env
+        self.batch = Batch(env.model, env.num_envs)
+        self._ctrl = self.batch.bind("ctrl")
+
+    def follow(self, actions: torch.Tensor) -> None:
+        """Take actions' set points, as the environment does. Shape: (num_steps, num_envs, 12)."""
+        cfg = self._env.cfg
+        clipped = torch.nan_to_num(actions).clamp(-cfg.action_clip, cfg.action_clip)
+        self._targets = (self._env.stand + cfg.action_scale * clipped).double().numpy()
+
+    def run(self) -> None:
+        """Step the physics."""
+        for target in self._targets:
+            self._ctrl[:] = target
+            self.batch.step(nstep=self._env.cfg.decimation)
+
+
 class _Replay:
-    """A rollout that a training's robots have done, done again by engine or environment alone."""
+    """A rollout that a training's robots have done, done again by engine or environment alone.
+
+    For the engine what falls stays down, and pushes are left out: in the first rollouts of a
+    training, which are timed, hardly a robot falls or is pushed.
+    """
 
     def __init__(self, env: QuadrupedEnv) -> None:
         """Make the same robots twice; `env` is the training's."""
         self._env = QuadrupedEnv(env.cfg)
-        self._batch = Batch(env.model, env.num_envs)
-        self._ctrl, self._state = self._batch.bind("ctrl"), self._batch.bind("state")
+        self._physics = _Physics(env)
+        self.engine = self._physics.run
+        batch = self._physics.batch
+        self._state = batch.bind("state")
         for key, value in env.simulation.state_dict().items():
             if key.startswith("field/"):
-                self._batch.expand(key.removeprefix("field/"))[:] = value.numpy()
-        self._batch.set_const()
+                batch.expand(key.removeprefix("field/"))[:] = value.numpy()
+        batch.set_const()
 
     def load(self, before: dict[str, Any], actions: torch.Tensor) -> None:
         """Go to where a rollout began.
@@ -221,22 +249,10 @@ class _Replay:
             before: The environment's state there.
             actions: Actions of the rollout. Shape: (num_steps, num_envs, 12).
         """
-        env = self._env
-        env.load_state_dict(before)
+        self._env.load_state_dict(before)
         self._state[:] = before["simulation"]["integration"].numpy()
         self._actions = actions.clone()
-        clip = env.cfg.action_clip
-        clipped = torch.nan_to_num(self._actions).clamp(-clip, clip)  # as the environment does
-        self._targets = (env.stand + env.cfg.action_scale * clipped).double().numpy()
-
-    def engine(self) -> None:
-        """Step the physics alone: what falls stays down, and pushes are left out.
-
-        In the first rollouts of a training, which are timed, hardly a robot falls or is pushed.
-        """
-        for target in self._targets:
-            self._ctrl[:] = target
-            self._batch.step(nstep=self._env.cfg.decimation)
+        self._physics.follow(actions)
 
     @torch.inference_mode()
     def environment(self) -> None:
@@ -246,18 +262,10 @@ class _Replay:
 
 
 def _nominal_engine(env: QuadrupedEnv, steps: int) -> Callable[[], None]:
-    batch = Batch(env.model, env.num_envs)
-    ctrl = batch.bind("ctrl")
-    batch.reset(keyframe=env.model.key("stand").id)
-    noise = env.cfg.action_scale * _ACTION_STD * torch.randn(steps, env.num_envs, NUM_ACTIONS)
-    targets = (env.stand + noise).double().numpy()
-
-    def run() -> None:
-        for target in targets:
-            ctrl[:] = target
-            batch.step(nstep=env.cfg.decimation)
-
-    return run
+    physics = _Physics(env)
+    physics.batch.reset(keyframe=env.model.key("stand").id)
+    physics.follow(_ACTION_STD * torch.randn(steps, env.num_envs, NUM_ACTIONS))
+    return physics.run
 
 
 def _collection(runner: MuteRunner, steps: int) -> Callable[[], None]:

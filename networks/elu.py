@@ -1,7 +1,7 @@
 """ELU, whose exponential is a power of two on a CPU: torch's own takes half as long again there.
 
 exp(x) - 1 = 2^(x log2 e) - 1, in float32 within 1e-7 of the exact value, as torch's `expm1` is. On
-a GPU, in half precision and in an exported or scripted graph it is torch's.
+a GPU, in half precision and where operations are made into a graph it is torch's.
 
 Source: Clevert et al., "Fast and accurate deep network learning by exponential linear units", 2016.
 """
@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-__all__ = ["ELU", "elu_backward", "elu_into", "has_fast_form", "refuse_second_derivative"]
+__all__ = ["ELU", "elu_backward", "elu_into", "has_fast_form"]
 
 _LOG2_E = math.log2(math.e)
 
@@ -33,19 +33,6 @@ def has_fast_form(value: Tensor) -> bool:
         or torch.compiler.is_compiling()  # or exporting
         or torch._C._are_functorch_transforms_active()
     )
-
-
-def refuse_second_derivative(what: str) -> None:
-    """Raise where a backward pass is itself recorded.
-
-    torch's `once_differentiable` raises only where its result is differentiated on the way to what
-    is asked for: a gradient penalty is wrong without a word.
-
-    Raises:
-        RuntimeError: If gradients are recorded.
-    """
-    if torch.is_grad_enabled():
-        raise RuntimeError(f"{what} has no second derivative: do not set create_graph")
 
 
 def elu_into(value: Tensor, out: Tensor) -> Tensor:

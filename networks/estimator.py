@@ -228,8 +228,12 @@ class Estimator(nn.Module):
         """Turn hidden states, shape (., lstm_hidden), into an estimate."""
         # One product for all heads, of which the weights alone are read: each has too few outputs
         # to keep a processor busy.
-        heads = self.heights_head, self.base_lin_vel_head, self.latent_mean_head
-        heads = *heads, self.latent_log_var_head
+        heads = (
+            self.heights_head,
+            self.base_lin_vel_head,
+            self.latent_mean_head,
+            self.latent_log_var_head,
+        )
         weight = torch.cat([head.weight for head in heads])
         outputs = functional.linear(hidden, weight, torch.cat([head.bias for head in heads]))
         heights, base_lin_vel, mean, log_var = outputs.split(

@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
-from networks.elu import has_fast_form, refuse_second_derivative
+from networks.autograd import once_differentiable
+from networks.elu import has_fast_form
 
 __all__ = ["State", "Weights", "lstm_sequence", "lstm_step"]
 
@@ -47,18 +48,17 @@ def lstm_step(value: Tensor, state: State, weights: Weights) -> State:
     """
     hidden, cell = state
     gates = torch.addmm(weights.bias, value, weights.input.t())
-    in_place = has_fast_form(gates) and not torch.is_grad_enabled()
-    if not in_place:
-        gates = torch.addmm(gates, hidden, weights.hidden.t())
-        input_gate, forget_gate, candidate, output_gate = gates.chunk(4, dim=-1)
-        kept = torch.sigmoid(forget_gate) * cell
-        cell = kept + torch.sigmoid(input_gate) * _tanh(candidate)
-        return torch.sigmoid(output_gate) * _tanh(cell), cell
-    gates.addmm_(hidden, weights.hidden.t())
-    input_gate, forget_gate, half_candidate, output_gate = _activate_(gates)
-    candidate = half_candidate.mul_(2.0).sub_(1.0)
-    cell = (forget_gate * cell).add_(candidate.mul_(input_gate))
-    return (2.0 * cell).sigmoid_().mul_(2.0).sub_(1.0).mul_(output_gate), cell
+    if has_fast_form(gates) and not torch.is_grad_enabled():
+        gates.addmm_(hidden, weights.hidden.t())
+        input_gate, forget_gate, half_candidate, output_gate = _activate_(gates)
+        candidate = half_candidate.mul_(2.0).sub_(1.0)
+        cell = (forget_gate * cell).add_(candidate.mul_(input_gate))
+        return (2.0 * cell).sigmoid_().mul_(2.0).sub_(1.0).mul_(output_gate), cell
+    gates = torch.addmm(gates, hidden, weights.hidden.t())
+    input_gate, forget_gate, candidate, output_gate = gates.chunk(4, dim=-1)
+    kept = torch.sigmoid(forget_gate) * cell
+    cell = kept + torch.sigmoid(input_gate) * _tanh(candidate)
+    return torch.sigmoid(output_gate) * _tanh(cell), cell
 
 
 def lstm_sequence(
@@ -125,21 +125,15 @@ class _Sequence(torch.autograd.Function):
         return hiddens, cell
 
     @staticmethod
+    @once_differentiable("an LSTM's sequence")
     def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
         ctx: Any,  # noqa: ANN401
         *grad_outputs: Tensor,
     ) -> tuple[Tensor | None, ...]:
-        """Return the gradients of what `forward` was given.
-
-        Raises:
-            RuntimeError: If a second derivative is asked for.
-        """
-        refuse_second_derivative("an LSTM's sequence")
+        """Return the gradients of what `forward` was given."""
         hiddens_grad, cell_grad = grad_outputs
-        (values, hiddens_before, cells_before, gates, candidates, cells_tanh) = ctx.saved_tensors[
-            :6
-        ]
-        starts, weight_ih, weight_hh = ctx.saved_tensors[6:]
+        values, hiddens_before, cells_before, *saved = ctx.saved_tensors
+        gates, candidates, cells_tanh, starts, weight_ih, weight_hh = saved
         gates_grad = torch.empty_like(gates)
         hidden_grad = torch.zeros_like(cell_grad)
         for step in reversed(range(len(gates))):

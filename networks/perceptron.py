@@ -15,7 +15,8 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from networks.elu import ELU, elu_backward, elu_into, has_fast_form, refuse_second_derivative
+from networks.autograd import once_differentiable
+from networks.elu import ELU, elu_backward, elu_into, has_fast_form
 
 __all__ = ["perceptron"]
 
@@ -63,7 +64,7 @@ def _rows_of_block(widths: Sequence[int]) -> int:
 def _rows(num_rows: int, widths: Sequence[int]) -> list[slice]:
     """Return the rows of each block."""
     step = _rows_of_block(widths)
-    return [slice(first, min(first + step, num_rows)) for first in range(0, num_rows, step)]
+    return [slice(first, first + step) for first in range(0, num_rows, step)]
 
 
 class _Buffer:
@@ -96,16 +97,12 @@ class _Perceptron(torch.autograd.Function):
         return outputs[-1]
 
     @staticmethod
+    @once_differentiable("a perceptron")
     def backward(  # pyright: ignore[reportIncompatibleMethodOverride]
         ctx: Any,  # noqa: ANN401
         *grad_outputs: Tensor,
     ) -> tuple[Tensor | None, ...]:
-        """Return no gradient of the input, and those of the parameters.
-
-        Raises:
-            RuntimeError: If a second derivative is asked for.
-        """
-        refuse_second_derivative("a perceptron")
+        """Return no gradient of the input, and those of the parameters."""
         saved = ctx.saved_tensors
         inputs, weights = saved[: len(saved) // 2], saved[len(saved) // 2 :]
         weight_grads = [torch.zeros_like(weight) for weight in weights]

@@ -71,10 +71,10 @@ def test_engine_and_environment_do_again_what_the_training_did():
         replay.engine()
         replay.environment()
         assert torch.equal(replay._env.simulation.qpos, env.simulation.qpos)
-        qpos = torch.from_numpy(replay._batch.bind("qpos")).float()
+        qpos = torch.from_numpy(replay._physics.batch.bind("qpos")).float()
         torch.testing.assert_close(qpos, env.simulation.qpos, atol=1e-4, rtol=1e-4)
     friction = env.simulation.field("geom_friction").numpy()
-    assert (replay._batch.expand("geom_friction") == friction).all()
+    assert (replay._physics.batch.expand("geom_friction") == friction).all()
     assert friction.std() > 0.0
 
 
