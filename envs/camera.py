@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from envs.quadruped_env import QuadrupedEnv
+from .quadruped_env import QuadrupedEnv
 
 __all__ = ["Camera"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
+from .quadruped_env_cfg import QuadrupedEnvCfg
 
 __all__ = ["Curriculum", "curriculum"]
 

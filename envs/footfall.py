@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import torch
 
-from envs.phase import CausalContacts
+from .phase import CausalContacts
 
 __all__ = ["FootfallCfg", "Footfalls"]
 

@@ -1,8 +1,8 @@
 """The same environment for Gymnasium: one robot, or a batch of them as a `VectorEnv`.
 
-`import envs.gym` registers `MUTE/Go1-v0` for `gymnasium.make` and `gymnasium.make_vec`; without an
-import, `gymnasium.make("envs.gym:MUTE/Go1-v0")` does both. Observations are the group `policy` of
-`envs.quadruped_env`, and what a critic may see besides stands in `info["privileged"]`. The phase
+`import mute` registers `MUTE/Go1-v0` for `gymnasium.make` and `gymnasium.make_vec`; without an
+import, `gymnasium.make("mute.envs.gym:MUTE/Go1-v0")` does both. Observations are the group `policy`
+of `quadruped_env`, and what a critic may see besides stands in `info["privileged"]`. The phase
 terms of the reward use the true, causal phase here: nothing estimates it outside of training.
 """
 
@@ -17,12 +17,12 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from envs.camera import Camera
-from envs.gym_robots import Robots
-from envs.observations import OBS_DIM
-from envs.quadruped_env import NUM_ACTIONS
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
-from envs.rewards import RewardsCfg
+from .camera import Camera
+from .gym_robots import Robots
+from .observations import OBS_DIM
+from .quadruped_env import NUM_ACTIONS
+from .quadruped_env_cfg import QuadrupedEnvCfg
+from .rewards import RewardsCfg
 
 __all__ = ["Go1Env", "Go1VectorEnv"]
 
@@ -263,6 +263,6 @@ def _action_space(cfg: QuadrupedEnvCfg) -> spaces.Box:
 
 gymnasium.register(
     id="MUTE/Go1-v0",
-    entry_point="envs.gym:Go1Env",
-    vector_entry_point="envs.gym:Go1VectorEnv",
+    entry_point="mute.envs.gym:Go1Env",
+    vector_entry_point="mute.envs.gym:Go1VectorEnv",
 )

@@ -9,8 +9,8 @@ import gymnasium
 import numpy as np
 import torch
 
-from envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
+from .quadruped_env import NUM_ACTIONS, QuadrupedEnv
+from .quadruped_env_cfg import QuadrupedEnvCfg
 
 __all__ = ["Robots"]
 

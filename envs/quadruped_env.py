@@ -14,18 +14,18 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from envs.commands import CommandSampler
-from envs.curriculum import Curriculum, curriculum
-from envs.footfall import Footfalls
-from envs.observations import OBS_DIM, noise_amplitude, policy_observation, slices
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
-from envs.randomization import PHYSICS_DIM, randomize_physics
-from envs.rewards import Motion, RewardSum
-from envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS, build_scene
-from envs.sensors import RobotSensors
-from envs.simulation import make_simulation
-from envs.step_log import curriculum_log, episode_log, gait_log
-from envs.terrain import FlatTerrain, Terrain
+from .commands import CommandSampler
+from .curriculum import Curriculum, curriculum
+from .footfall import Footfalls
+from .observations import OBS_DIM, noise_amplitude, policy_observation, slices
+from .quadruped_env_cfg import QuadrupedEnvCfg
+from .randomization import PHYSICS_DIM, randomize_physics
+from .rewards import Motion, RewardSum
+from .scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS, build_scene
+from .sensors import RobotSensors
+from .simulation import make_simulation
+from .step_log import curriculum_log, episode_log, gait_log
+from .terrain import FlatTerrain, Terrain
 
 __all__ = ["NUM_ACTIONS", "QuadrupedEnv"]
 

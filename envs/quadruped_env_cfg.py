@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass, field
 from typing import get_args
 
-from envs.commands import CommandsCfg
-from envs.footfall import FootfallCfg
-from envs.observations import ObservationsCfg
-from envs.randomization import RandomizationCfg
-from envs.rewards import RewardsCfg
-from envs.scene import SceneCfg
-from envs.simulation import Engine
-from envs.terrain import HeightMapCfg
+from .commands import CommandsCfg
+from .footfall import FootfallCfg
+from .observations import ObservationsCfg
+from .randomization import RandomizationCfg
+from .rewards import RewardsCfg
+from .scene import SceneCfg
+from .simulation import Engine
+from .terrain import HeightMapCfg
 
 __all__ = ["QuadrupedEnvCfg"]
 

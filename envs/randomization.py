@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import torch
 
-from envs.simulation import Simulation
+from .simulation import Simulation
 
 __all__ = ["RandomizationCfg", "randomize_physics"]
 

@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 
 import mujoco
 
-from envs.menagerie import dress_in_menagerie
+from .menagerie import dress_in_menagerie
 
 LEGS: tuple[str, ...] = ("FR", "FL", "RR", "RL")
 """The legs, in the order of every per-leg array."""

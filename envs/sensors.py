@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import torch
 
-from envs.scene import LEGS
-from envs.simulation import Simulation
+from .scene import LEGS
+from .simulation import Simulation
 
 __all__ = ["RobotSensors", "sensor_history", "sensor_slice"]
 

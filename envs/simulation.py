@@ -229,6 +229,6 @@ def make_simulation(
     """
     if engine == "mjbatch" or (engine == "auto" and torch.device(device).type == "cpu"):
         return BatchSimulation(model, num_envs, num_threads)
-    from envs.warp_simulation import WarpSimulation  # leaves Warp out where nobody asks for it
+    from .warp_simulation import WarpSimulation  # leaves Warp out where nobody asks for it
 
     return WarpSimulation(model, num_envs, device)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from envs.curriculum import Curriculum
-from envs.footfall import Footfalls
+from .curriculum import Curriculum
+from .footfall import Footfalls
 
 __all__ = ["curriculum_log", "episode_log", "gait_log"]
 

@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 import torch
 
-from envs.simulation import MAX_SPEED
+from .simulation import MAX_SPEED
 
 __all__ = ["WarpSimulation"]
 

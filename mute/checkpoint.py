@@ -17,8 +17,8 @@ from typing import Any
 
 import torch
 
-from mute.errors import MuteError
-from mute.files import replace_file
+from mute.support.errors import MuteError
+from mute.support.files import replace_file
 
 _FORMAT = "mute-checkpoint"
 _VERSION = 1

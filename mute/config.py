@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 import cattrs
 
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
-from networks.estimator import EstimatorCfg
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.networks.estimator import EstimatorCfg
 
 __all__ = ["AgentCfg", "EstimationCfg", "PPOCfg", "TaskCfg", "from_plain", "to_plain"]
 
@@ -118,7 +118,7 @@ class AgentCfg:
     activation: Literal["elu", "relu", "selu", "tanh"] = "elu"
     """Activation of actor and critic."""
     symmetric: bool = False
-    """Whether the networks treat left and right alike, see `networks.reflection`."""
+    """Whether the networks treat left and right alike, see `mute.networks.reflection`."""
     init_std: float = 1.0
     """Standard deviation of the actions at the start."""
     std_range: tuple[float, float] = (0.05, 1.2)
@@ -170,12 +170,12 @@ class AgentCfg:
     def rsl_rl(self) -> dict[str, Any]:
         """Return the configuration that rsl_rl's runner takes."""
         network = {
-            "class_name": "mute.storage:PreparedModel",
+            "class_name": "mute.learning.storage:PreparedModel",
             "activation": self.activation,
             "obs_normalization": True,
         }
         distribution = {
-            "class_name": "mute.distribution:SharedGaussian",
+            "class_name": "mute.learning.distribution:SharedGaussian",
             "init_std": self.init_std,
             "std_range": self.std_range,
         }
@@ -188,8 +188,8 @@ class AgentCfg:
             },
             "actor": network | {"hidden_dims": self.actor_hidden, "distribution_cfg": distribution},
             "critic": network | {"hidden_dims": self.critic_hidden},
-            "algorithm": {"class_name": "mute.algorithm:EstimatorPPO"} | asdict(self.ppo),
-            "logger": {"class_name": "mute.logger:CurveWriter"},
+            "algorithm": {"class_name": "mute.learning.algorithm:EstimatorPPO"} | asdict(self.ppo),
+            "logger": {"class_name": "mute.learning.logger:CurveWriter"},
         }
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from envs.commands import CommandsCfg
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
-from envs.randomization import RandomizationCfg
-from envs.rewards import RewardsCfg
 from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg
-from mute.errors import MuteError
+from mute.envs.commands import CommandsCfg
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.randomization import RandomizationCfg
+from mute.envs.rewards import RewardsCfg
+from mute.support.errors import MuteError
 
 __all__ = ["DEFAULT_TASK", "make_task", "task_names"]
 

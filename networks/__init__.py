@@ -1,5 +1,5 @@
 """Torch modules of the method; they know nothing of environments."""
 
-from networks.estimator import Estimate, Estimator, EstimatorCfg, State
+from .estimator import Estimate, Estimator, EstimatorCfg, State
 
 __all__ = ["Estimate", "Estimator", "EstimatorCfg", "State"]

@@ -14,9 +14,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from networks.elu import ELU
-from networks.lstm import State, Weights, lstm_sequence, lstm_step
-from networks.reflection import Reflection, tie_layer, tie_mlp, tie_vector
+from .elu import ELU
+from .lstm import State, Weights, lstm_sequence, lstm_step
+from .reflection import Reflection, tie_layer, tie_mlp, tie_vector
 
 __all__ = ["Estimate", "Estimator", "EstimatorCfg", "State"]
 

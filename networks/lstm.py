@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
-from networks.autograd import once_differentiable
-from networks.elu import has_fast_form
+from .autograd import once_differentiable
+from .elu import has_fast_form
 
 __all__ = ["State", "Weights", "lstm_sequence", "lstm_step"]
 

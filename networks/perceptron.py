@@ -15,8 +15,8 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from networks.autograd import once_differentiable
-from networks.elu import ELU, elu_backward, elu_into, has_fast_form
+from .autograd import once_differentiable
+from .elu import ELU, elu_backward, elu_into, has_fast_form
 
 __all__ = ["perceptron"]
 

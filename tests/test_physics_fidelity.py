@@ -9,12 +9,12 @@ import dataclasses
 
 import pytest
 import torch
+from places import SHIPPED_POLICY
 
-from envs.quadruped_env import QuadrupedEnv
-from envs.scene import LEGS
-from envs.sensors import sensor_slice
-from mute.command_lines.arguments import REPOSITORY
 from mute.controllers import LearnedController, load_policy
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.scene import LEGS
+from mute.envs.sensors import sensor_slice
 from mute.evaluation.trials import evaluation_cfg, run_trial
 
 ROBOTS = 8
@@ -28,7 +28,7 @@ large; all else agrees within 1 %."""
 
 
 def _walk(timestep: float, beta: float) -> dict[str, float]:
-    policy = load_policy(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
+    policy = load_policy(SHIPPED_POLICY)
     cfg = evaluation_cfg(policy.cfg.env, ROBOTS, SECONDS, seed=1)
     scene = dataclasses.replace(cfg.scene, timestep=timestep, foot_forces=True)
     env = QuadrupedEnv(

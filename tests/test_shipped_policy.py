@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import onnxruntime
 import pytest
 import torch
+from places import REPOSITORY
 from tensordict import TensorDict
 
-from envs.quadruped_env import QuadrupedEnv
 from mute.controllers import LearnedController, load_policy
+from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.tables import read_json
 from mute.evaluation.trials import evaluation_cfg, run_trial
 
-RESOURCES = Path(__file__).resolve().parents[1] / "resources" / "go1"
+RESOURCES = REPOSITORY / "resources" / "go1"
 
 
 @pytest.fixture(scope="module")

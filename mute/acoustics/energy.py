@@ -22,16 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mute.acoustics.contacts import ContactBlock
-from mute.acoustics.drive import DRIVE_BAND, drive_squares
-from mute.acoustics.fan import fan_squares
 from mute.acoustics.floors import Floor, find_floors
-from mute.acoustics.impacts import contact_time, floor_modes, pulse_spectrum
-from mute.acoustics.levels import LevelDetector, Levels
+from mute.acoustics.metering.levels import LevelDetector, Levels
+from mute.acoustics.metering.weighting import a_weighting_db
 from mute.acoustics.microphone import Microphone, distance
-from mute.acoustics.noise import band_a_weight, filter_response
-from mute.acoustics.scuffing import radiated_shares, sliding_squares
 from mute.acoustics.soundscape import SOURCES, StepClock, check_sources, floor_gains
-from mute.acoustics.weighting import a_weighting_db
+from mute.acoustics.sources.band_noise import band_a_weight, filter_response
+from mute.acoustics.sources.drive import DRIVE_BAND, drive_squares
+from mute.acoustics.sources.fan import fan_squares
+from mute.acoustics.sources.impacts import contact_time, floor_modes, pulse_spectrum
+from mute.acoustics.sources.scuffing import radiated_shares, sliding_squares
 
 __all__ = ["EnergyMeter", "impact_exposure"]
 

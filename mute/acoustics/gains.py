@@ -7,11 +7,12 @@ import math
 from pathlib import Path
 
 from mute.acoustics.floors import FLOORS
-from mute.errors import MuteError
+from mute.support.errors import MuteError
+from mute.support.resources import RESOURCES
 
 __all__ = ["GAINS_FILE", "load_gains"]
 
-GAINS_FILE = Path(__file__).resolve().parents[2] / "resources" / "acoustics" / "calibration.json"
+GAINS_FILE = RESOURCES / "acoustics" / "calibration.json"
 """Made by `python -m mute.acoustics.calibration`."""
 
 

@@ -19,16 +19,16 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from envs.quadruped_env import QuadrupedEnv
 from mute.acoustics.contacts import ContactBlock
 from mute.acoustics.energy import EnergyMeter
-from mute.acoustics.levels import settling_time
+from mute.acoustics.files.wav_file import WavFile
+from mute.acoustics.metering.levels import settling_time
+from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.recorder import FloorAt, Recorder
-from mute.acoustics.sound_level_meter import SoundLevelMeter
 from mute.acoustics.soundscape import SOURCES, Soundscape
 from mute.acoustics.tally import HeardLevels, Tally
-from mute.acoustics.wav_file import WavFile
+from mute.envs.quadruped_env import QuadrupedEnv
 
 __all__ = ["SAMPLE_RATE", "WAV_FULL_SCALE", "Listener"]
 

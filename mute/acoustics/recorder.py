@@ -12,10 +12,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from envs.quadruped_env import QuadrupedEnv
-from envs.scene import FOOT_RADIUS, LEGS
-from envs.sensors import sensor_slice
 from mute.acoustics.contacts import ContactBlock, Impacts
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.scene import FOOT_RADIUS, LEGS
+from mute.envs.sensors import sensor_slice
 
 __all__ = ["Recorder", "effective_mass"]
 

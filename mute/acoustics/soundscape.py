@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mute.acoustics.contacts import ContactBlock
-from mute.acoustics.drive import Drive
-from mute.acoustics.fan import Fan
 from mute.acoustics.floors import find_floors
-from mute.acoustics.impacts import ImpactSound
 from mute.acoustics.microphone import Microphone
-from mute.acoustics.scuffing import Scuffing
+from mute.acoustics.sources.drive import Drive
+from mute.acoustics.sources.fan import Fan
+from mute.acoustics.sources.impacts import ImpactSound
+from mute.acoustics.sources.scuffing import Scuffing
 
 __all__ = ["SOURCES", "Soundscape", "StepClock", "check_sources", "floor_gains"]
 

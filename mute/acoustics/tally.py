@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mute.acoustics.levels import P_REF
+from mute.acoustics.metering.levels import P_REF
 
 __all__ = ["HeardLevels", "Tally"]
 

@@ -14,10 +14,9 @@ from typing import Annotated, TypeVar
 
 import tyro
 
-from mute.errors import MuteError
+from mute.support.errors import MuteError
 
 __all__ = [
-    "REPOSITORY",
     "Numbers",
     "Words",
     "check_betas",
@@ -32,9 +31,6 @@ __all__ = [
     "resolve_device",
     "selected_task",
 ]
-
-REPOSITORY = Path(__file__).resolve().parents[2]
-"""Root of the repository, where the resources are."""
 
 
 def _split(words: Sequence[str]) -> list[str]:

@@ -15,8 +15,8 @@ from mute.command_lines.evaluate_noise import (
     sweep_beta,
     sweep_speed,
 )
-from mute.command_lines.walk import WalkArgs, walk
-from mute.errors import MuteError
+from mute.command_lines.evaluate_walk import WalkArgs, walk
+from mute.support.errors import MuteError
 
 __all__ = ["main"]
 

@@ -11,18 +11,19 @@ from typing import Any
 import torch
 from rich.progress import track
 
-from envs.commands import BETA, CommandSampler
-from envs.quadruped_env import QuadrupedEnv
-from mute.command_lines.arguments import REPOSITORY, Numbers, check_betas, check_trials
+from mute.command_lines.arguments import Numbers, check_betas, check_trials
 from mute.controllers import LearnedController, load_policy
 from mute.controllers.learned import Policy
-from mute.errors import MuteError
+from mute.envs.commands import BETA, CommandSampler
+from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.estimation_errors import EstimationMeter
 from mute.evaluation.matched_speed import sweep_beta_at_speed
 from mute.evaluation.progress import Milestone, checkpoints_of, training_minutes, walks
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.trials import evaluation_cfg, run_trial
-from mute.provenance import machine_kind
+from mute.support.errors import MuteError
+from mute.support.provenance import REPOSITORY, machine_kind
+from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK
 
 __all__ = ["GaitArgs", "ProgressArgs", "gait", "progress"]
@@ -34,7 +35,7 @@ _SWEEP_ROBOTS = 300
 class GaitArgs:
     """Walk over the command range, and at one actual speed for several betas."""
 
-    policy: Path = REPOSITORY / "resources" / "go1" / f"{DEFAULT_TASK}.pt"
+    policy: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
     """Policy to measure."""
     trials: int = 256
     """Robots that walk over the command range, for each beta."""

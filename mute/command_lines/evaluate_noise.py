@@ -14,9 +14,9 @@ import tyro
 
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
+from mute.acoustics.origin import sound_origin
 from mute.acoustics.soundscape import SOURCES
 from mute.command_lines.arguments import (
-    REPOSITORY,
     Numbers,
     Words,
     check_betas,
@@ -37,11 +37,11 @@ from mute.command_lines.sound_options import (
     tell,
     tell_kept,
 )
-from mute.errors import MuteError
-from mute.evaluation.noise import SETTLE_TIME, NoiseRow, NoiseSetting, measure_noise
-from mute.evaluation.recordings import Recordings
+from mute.evaluation.noise_levels import SETTLE_TIME, NoiseRow, NoiseSetting, measure_noise
 from mute.evaluation.tables import print_table, write_csv, write_json
-from mute.provenance import sound_origin
+from mute.rendering.recordings import Recordings
+from mute.support.errors import MuteError
+from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK
 
 __all__ = ["NoiseArgs", "SweepBetaArgs", "SweepSpeedArgs", "noise", "sweep_beta", "sweep_speed"]
@@ -65,7 +65,7 @@ _Draw = Callable[[Sequence[NoiseRow], Path], list[Path]]
 
 @dataclass
 class _CommonArgs:
-    policy: Path = REPOSITORY / "resources" / "go1" / f"{DEFAULT_TASK}.pt"
+    policy: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
     """Policy to measure."""
     trials: int = 5
     """Robots for each setting, side by side."""

@@ -13,16 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from envs.menagerie import SceneError
-from envs.quadruped_env import QuadrupedEnv
-from envs.scene import Look
+from mute.acoustics.audible_env import audible_cfg
+from mute.acoustics.files.wav import has_samples
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
+from mute.acoustics.live_listener import LiveListener
 from mute.acoustics.soundscape import SOURCES
-from mute.acoustics.wav import has_samples
 from mute.checkpoint import latest_checkpoint
 from mute.command_lines.arguments import (
-    REPOSITORY,
     check_seed,
     check_video,
     check_wav,
@@ -38,17 +36,21 @@ from mute.command_lines.sound_options import (
     progress_bar,
 )
 from mute.controllers import LearnedController, load_policy
+from mute.controllers.command import COMMAND_LIMITS, Command
 from mute.controllers.learned import Policy
-from mute.errors import EXIT_INTERRUPTED, MuteError
+from mute.envs.menagerie import SceneError
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.scene import Look
+from mute.evaluation.session import Session
 from mute.evaluation.trials import evaluation_cfg
-from mute.hearing import Ear, audible_cfg
+from mute.live.keys import KEYS_HELP
 from mute.rendering.backend import has_display, why_no_window
-from mute.rendering.keys import KEYS_HELP
 from mute.rendering.sound_track import temporary_sound
 from mute.rendering.video import Video
-from mute.session import COMMAND_LIMITS, Command, Session
+from mute.support.errors import EXIT_INTERRUPTED, MuteError
+from mute.support.resources import RESOURCES
+from mute.support.threads import use_collection_threads
 from mute.tasks import DEFAULT_TASK, make_task
-from mute.threads import use_collection_threads
 
 __all__ = ["PlayArgs", "main"]
 
@@ -197,7 +199,7 @@ def _tell_sound(path: Path, session: Session) -> None:
         path.unlink(missing_ok=True)
         print(f"{path} is not written: the walk ended before its sound began", file=sys.stderr)
         return
-    clipped = session.ear.clipped if session.ear else 0
+    clipped = session.listener.clipped if session.listener else 0
     note = f" ({clipped} samples are clipped)" if clipped else ""
     print(f"sound: {path}{note}", file=sys.stderr)
 
@@ -227,10 +229,10 @@ def _make_session(args: PlayArgs, endless: bool) -> Session:
     seconds = _MAX_SECONDS if endless else args.seconds or _DEFAULT_SECONDS
     settle_time = min(_SETTLE_TIME, 0.5 * seconds)
     env = _make_env(args, policy, seconds)
-    ear = _make_ear(args, env, settle_time)
+    listener = _make_listener(args, env, settle_time)
     _print_header(args, policy)
     controller = LearnedController(policy, args.num_envs)
-    return Session(env, controller, args.command, settle_time, ear)
+    return Session(env, controller, args.command, settle_time, listener)
 
 
 def _make_env(args: PlayArgs, policy: Policy, seconds: float) -> QuadrupedEnv:
@@ -255,11 +257,11 @@ def _make_env(args: PlayArgs, policy: Policy, seconds: float) -> QuadrupedEnv:
         raise MuteError(str(error)) from error
 
 
-def _make_ear(args: PlayArgs, env: QuadrupedEnv, settle_time: float) -> Ear | None:
+def _make_listener(args: PlayArgs, env: QuadrupedEnv, settle_time: float) -> LiveListener | None:
     if not env.cfg.scene.foot_forces:
         return None
     surface = args.floor or _SURFACE
-    return Ear(
+    return LiveListener(
         env,
         surface,
         load_gains(),
@@ -280,7 +282,7 @@ def _policy_path(args: PlayArgs) -> Path:
     task = args.task or DEFAULT_TASK
     make_task(task)
     if args.policy is None:
-        path = REPOSITORY / "resources" / "go1" / f"{task}.pt"
+        path = RESOURCES / "go1" / f"{task}.pt"
         if not path.is_file():
             raise MuteError(
                 f"no policy ships for task {task!r} ({path} is missing): learn one with "
@@ -295,7 +297,7 @@ def _num_steps(args: PlayArgs, session: Session) -> int:
 
 
 def _walk_in_window(args: PlayArgs, session: Session) -> None:
-    from mute.rendering.window import watch  # loads GLFW, which only a window needs
+    from mute.live.window import watch  # loads GLFW, which only a window needs
 
     def shown() -> dict[str, str]:
         command = session.command
@@ -307,7 +309,7 @@ def _walk_in_window(args: PlayArgs, session: Session) -> None:
 
     print(KEYS_HELP, flush=True)
     num_steps = None if args.seconds is None else _num_steps(args, session)
-    with session.ear or contextlib.nullcontext():
+    with session.listener or contextlib.nullcontext():
         watch(session, num_steps, shown)
 
 
@@ -334,7 +336,7 @@ def _walk_in_text(
     num_steps = _num_steps(args, session)
     per_second = round(1.0 / session.env.step_dt)
     show_bar = on_step is not None and not args.json and sys.stderr.isatty()
-    heard = session.ear or contextlib.nullcontext()
+    heard = session.listener or contextlib.nullcontext()
     bar = progress_bar("filming", num_steps) if show_bar else contextlib.nullcontext()
     with heard, bar as advance:
         for step in range(num_steps):

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from mute.evaluation.gait import Gait
-from mute.session import Session
+from mute.evaluation.session import Session
 
 __all__ = ["captions", "live_captions", "report", "summary"]
 
@@ -26,15 +26,15 @@ _REPORTED = (
 
 def report(session: Session) -> dict[str, Any]:
     """Return what --json prints; figures that were not to be had are None."""
-    command, ear = session.command, session.ear
+    command, listener = session.command, session.listener
     gait = session.gait().as_dict()
-    figures = {name: gait[name] for name in _REPORTED} | (ear.levels() if ear else {})
+    figures = {name: gait[name] for name in _REPORTED} | (listener.levels() if listener else {})
     return {
         "beta": command.beta,
         "command": [command.vx, command.vy, command.wz],
         "num_envs": session.env.num_envs,
         "seconds": round(session.seconds, 6),
-        **({"surface": ear.surface} if ear else {}),
+        **({"surface": listener.surface} if listener else {}),
         **{name: value if math.isfinite(value) else None for name, value in figures.items()},
     }
 
@@ -53,14 +53,14 @@ def captions(gait: Gait) -> dict[str, str]:
 
 
 def live_captions(session: Session) -> dict[str, str]:
-    """Return the figures since this was last asked, and the level of now if there is an ear.
+    """Return the figures since this was last asked, and the level of now if there is an listener.
 
     The level is the first robot's, which is said where there are several.
     """
     figures = captions(session.recent_gait())
-    if session.ear is not None:
+    if session.listener is not None:
         whose = " (first robot)" if session.env.num_envs > 1 else ""
-        figures["level"] = _or_dash(f"{session.ear.level():.1f} dBA{whose}")
+        figures["level"] = _or_dash(f"{session.listener.level():.1f} dBA{whose}")
     return figures
 
 
@@ -70,7 +70,7 @@ def summary(session: Session, floor: str | None) -> dict[str, str]:
     Args:
         session: The walk.
         floor: Name of the floor that was walked on; None where it was training's, which only
-            sounds as the ear's surface.
+            sounds as the listener's surface.
     """
     gait = session.gait()
     figures = captions(gait) | {
@@ -78,9 +78,9 @@ def summary(session: Session, floor: str | None) -> dict[str, str]:
         "power": f"{gait.power:.1f} W",
         "fell": f"{100.0 * gait.fall_rate:.1f} % of the robots",
     }
-    if session.ear is not None:
-        levels = session.ear.levels()
-        about = ["modelled", f"on {floor}" if floor else f"sounding as {session.ear.surface}"]
+    if session.listener is not None:
+        levels = session.listener.levels()
+        about = ["modelled", f"on {floor}" if floor else f"sounding as {session.listener.surface}"]
         about += ["first robot"] * (session.env.num_envs > 1)
         for name in ("mnl", "pnl"):
             figures[f"level, {name.upper()}"] = f"{levels[name]:.1f} dBA ({', '.join(about)})"

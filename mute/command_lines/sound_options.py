@@ -13,13 +13,13 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from mute.acoustics import soundscape
+from mute.acoustics.audible_env import listening_cfg
 from mute.acoustics.microphone import Microphone
 from mute.command_lines.arguments import Words, check_distinct
 from mute.controllers import load_policy
 from mute.controllers.learned import Policy
-from mute.errors import MuteError
-from mute.evaluation.listening import listening_cfg
-from mute.evaluation.recordings import Recordings
+from mute.rendering.recordings import Recordings
+from mute.support.errors import MuteError
 
 __all__ = [
     "MicrophonePlace",

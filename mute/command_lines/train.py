@@ -14,8 +14,6 @@ from typing import Any
 import torch
 import yaml
 
-from envs.menagerie import SceneError
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.checkpoint import (
     CheckpointError,
     latest_checkpoint,
@@ -24,12 +22,15 @@ from mute.checkpoint import (
 )
 from mute.command_lines.arguments import command_line, parse, resolve_device, selected_task
 from mute.config import AgentCfg, TaskCfg, from_plain, to_plain
-from mute.distributed import Ranks, joined_ranks
-from mute.errors import EXIT_INTERRUPTED, MuteError
-from mute.files import replace_file
-from mute.logger import LiveDisplay, PlainDisplay
-from mute.provenance import current_commit, machine_kind
-from mute.runner import MuteRunner, Progress
+from mute.envs.menagerie import SceneError
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.evaluation.noise_probe import NoiseProbe
+from mute.learning.distributed import Ranks, joined_ranks
+from mute.learning.logger import LiveDisplay, PlainDisplay
+from mute.learning.runner import MuteRunner, Progress
+from mute.support.errors import EXIT_INTERRUPTED, MuteError
+from mute.support.files import replace_file
+from mute.support.provenance import current_commit, machine_kind
 from mute.tasks import DEFAULT_TASK, make_task
 
 __all__ = ["main"]
@@ -140,7 +141,7 @@ def _make_runner(
 ) -> MuteRunner:
     shown = on_iteration if ranks.first else None
     try:
-        return MuteRunner(args.task, cfg, run_dir, ranks.device(kind), shown, ranks)
+        return MuteRunner(args.task, cfg, run_dir, ranks.device(kind), shown, ranks, NoiseProbe())
     except (ValueError, SceneError) as error:
         raise MuteError(str(error)) from error
 

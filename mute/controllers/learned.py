@@ -9,13 +9,13 @@ from typing import Any
 import torch
 from tensordict import TensorDict
 
-from envs.observations import OBS_DIM
-from envs.quadruped_env import NUM_ACTIONS
 from mute.checkpoint import CheckpointError, first_line, load_checkpoint
 from mute.config import TaskCfg, from_plain
-from mute.estimated_env import estimate_group
-from mute.storage import PreparedModel
-from networks.estimator import Estimate, Estimator
+from mute.envs.observations import OBS_DIM
+from mute.envs.quadruped_env import NUM_ACTIONS
+from mute.learning.estimated_env import estimate_group
+from mute.learning.storage import PreparedModel
+from mute.networks.estimator import Estimate, Estimator
 
 __all__ = ["LearnedController", "Policy", "load_policy", "make_policy"]
 

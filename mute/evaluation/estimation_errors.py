@@ -7,9 +7,9 @@ from dataclasses import asdict, dataclass
 import torch
 from tensordict import TensorDict
 
-from envs.phase import hindsight_phase
-from envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE, QuadrupedEnv
 from mute.controllers.learned import LearnedController
+from mute.envs.phase import hindsight_phase
+from mute.envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE, QuadrupedEnv
 
 __all__ = ["EstimationErrors", "EstimationMeter"]
 

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 
 import torch
 
-from envs.quadruped_env import QuadrupedEnv
+from mute.envs.quadruped_env import QuadrupedEnv
 
 __all__ = ["Gait", "GaitMeter"]
 

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
-from envs.quadruped_env import QuadrupedEnv
 from mute.controllers.controller import Controller
+from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.gait import Gait
 from mute.evaluation.trials import run_trial
 

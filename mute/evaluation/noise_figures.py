@@ -11,7 +11,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mute.evaluation.noise import NoiseRow
+from mute.evaluation.noise_levels import NoiseRow
 
 __all__ = ["draw_beta_sweep", "draw_speed_sweep", "save_figure"]
 

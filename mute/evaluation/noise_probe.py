@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
+from typing import Any
 
+import torch
+
+from mute.acoustics.audible_env import listening_cfg
 from mute.acoustics.gains import load_gains
-from mute.controllers.learned import Policy
-from mute.evaluation.listening import listening_cfg
-from mute.evaluation.noise import NoiseSetting, measure_noise
+from mute.controllers.learned import Policy, make_policy
+from mute.evaluation.noise_levels import NoiseSetting, measure_noise
 
 __all__ = ["NoiseProbe"]
 
@@ -32,6 +35,16 @@ class NoiseProbe:
     def _gains(self) -> dict[str, float]:
         """The calibration: read once, and only where levels are measured."""
         return load_gains()
+
+    def __call__(self, saved: dict[str, Any]) -> dict[str, float]:
+        """Return the mean noise levels at the microphone on the trunk by curve, dBA.
+
+        Args:
+            saved: What `runner.policy_part` returns; see `measure`.
+        """
+        with torch.random.fork_rng(devices=[]):  # networks are born with random weights
+            policy = make_policy(saved)
+        return self.measure(policy)
 
     def measure(self, policy: Policy) -> dict[str, float]:
         """Return the mean noise levels at the microphone on the trunk by curve, dBA.

@@ -11,7 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from mute.plain_data import without_nan
+from mute.support.plain_data import without_nan
 
 __all__ = ["print_table", "read_json", "write_csv", "write_json"]
 

@@ -8,9 +8,9 @@ from collections.abc import Callable
 import torch
 from tensordict import TensorDict
 
-from envs.quadruped_env import QuadrupedEnv
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.controllers.controller import Controller
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.evaluation.gait import GaitMeter
 
 __all__ = ["evaluation_cfg", "run_trial"]

@@ -12,7 +12,7 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 
-from mute.errors import MuteError
+from mute.support.errors import MuteError
 
 __all__ = ["configure_rendering", "find_backend", "has_display", "why_no_window"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import imageio_ffmpeg
 
-from mute.errors import MuteError
+from mute.support.errors import MuteError
 
 __all__ = ["add_sound", "temporary_sound"]
 

@@ -18,9 +18,9 @@ import imageio
 import mujoco
 import numpy as np
 
-from envs.quadruped_env import QuadrupedEnv
-from mute.errors import MuteError
+from mute.envs.quadruped_env import QuadrupedEnv
 from mute.rendering.sound_track import add_sound
+from mute.support.errors import MuteError
 
 __all__ = ["Video"]
 

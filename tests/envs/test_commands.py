@@ -7,7 +7,7 @@ import math
 import pytest
 import torch
 
-from envs.commands import CommandSampler, CommandsCfg
+from mute.envs.commands import CommandSampler, CommandsCfg
 
 RANGES = {
     "lin_vel_x": (0.5, 1.5),

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from envs.commands import CommandsCfg
-from envs.curriculum import curriculum
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
-from envs.rewards import RewardsCfg
+from mute.envs.commands import CommandsCfg
+from mute.envs.curriculum import curriculum
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.rewards import RewardsCfg
 
 
 def _make_cfg(start: float = 0.0, end: float = 0.0) -> QuadrupedEnvCfg:

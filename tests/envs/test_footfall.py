@@ -7,7 +7,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from envs.footfall import FootfallCfg, Footfalls
+from mute.envs.footfall import FootfallCfg, Footfalls
 
 DECIMATION = 4
 AIR, GROUND = "....", "####"

@@ -12,11 +12,11 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from envs.commands import CommandsCfg
-from envs.gym import Go1Env, Go1VectorEnv
-from envs.observations import OBSERVATION_WIDTHS, ObservationsCfg, slices
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
-from envs.rewards import RewardsCfg
+from mute.envs.commands import CommandsCfg
+from mute.envs.gym import Go1Env, Go1VectorEnv
+from mute.envs.observations import OBSERVATION_WIDTHS, ObservationsCfg, slices
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.rewards import RewardsCfg
 
 POLICY = slices(OBSERVATION_WIDTHS)
 ACTION, COMMAND = POLICY["last_action"], POLICY["command"]
@@ -360,7 +360,7 @@ def test_a_batch_renders_every_robot(monkeypatch):
 
 
 def test_make_gives_the_environment_without_another_time_limit():
-    env = gymnasium.make("envs.gym:MUTE/Go1-v0")
+    env = gymnasium.make("mute.envs.gym:MUTE/Go1-v0")
     assert isinstance(env.unwrapped, Go1Env)
     assert "TimeLimit" not in str(env)
 

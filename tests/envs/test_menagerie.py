@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.menagerie import SceneError
-from envs.scene import SceneCfg, build_scene
+from mute.envs.menagerie import SceneError
+from mute.envs.scene import SceneCfg, build_scene
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import math
 import pytest
 import torch
 
-from envs.observations import (
+from mute.envs.observations import (
     OBS_DIM,
     OBSERVATION_WIDTHS,
     ObservationsCfg,

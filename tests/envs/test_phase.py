@@ -7,7 +7,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from envs.phase import CausalContacts, debounce, hindsight_phase
+from mute.envs.phase import CausalContacts, debounce, hindsight_phase
 
 SEGMENTS = st.lists(st.integers(2, 9), min_size=1, max_size=8)
 SAMPLES = st.lists(st.booleans(), min_size=1, max_size=40)

@@ -7,14 +7,14 @@ import math
 import pytest
 import torch
 
-from envs.commands import CommandsCfg
-from envs.observations import OBSERVATION_WIDTHS, ObservationsCfg, slices
-from envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE, QuadrupedEnv
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
-from envs.randomization import RandomizationCfg
-from envs.rewards import TERMS, RewardsCfg
-from envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS
-from envs.sensors import sensor_slice
+from mute.envs.commands import CommandsCfg
+from mute.envs.observations import OBSERVATION_WIDTHS, ObservationsCfg, slices
+from mute.envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE, QuadrupedEnv
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.randomization import RandomizationCfg
+from mute.envs.rewards import TERMS, RewardsCfg
+from mute.envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS
+from mute.envs.sensors import sensor_slice
 
 POLICY = slices(OBSERVATION_WIDTHS)
 QUIET = {"observations": ObservationsCfg(noise_level=0.0)}

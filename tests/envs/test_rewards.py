@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import torch
 
-from envs.rewards import GROUPS, TERMS, Motion, RewardsCfg, RewardSum
+from mute.envs.rewards import GROUPS, TERMS, Motion, RewardsCfg, RewardSum
 
 STEP_DT = 0.02
 

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.scene import (
+from mute.envs.scene import (
     FOOT_RADIUS,
     JOINT_NAMES,
     LEGS,
@@ -18,7 +18,7 @@ from envs.scene import (
     SceneCfg,
     build_scene,
 )
-from envs.sensors import sensor_slice
+from mute.envs.sensors import sensor_slice
 
 HIP_INERTIA = (0.000734064, 0.000468438, 0.000398719)
 THIGH_INERTIA = (0.00478717, 0.00460903, 0.000709268)

@@ -1,4 +1,4 @@
-"""Tests of the protocol of `envs.simulation`, which every engine is held to."""
+"""Tests of the protocol of `mute.envs.simulation`, which every engine is held to."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import math
 import pytest
 import torch
 
-from envs.scene import SceneCfg, build_scene
-from envs.sensors import sensor_history, sensor_slice
-from envs.simulation import BatchSimulation, Engine, make_simulation
+from mute.envs.scene import SceneCfg, build_scene
+from mute.envs.sensors import sensor_history, sensor_slice
+from mute.envs.simulation import BatchSimulation, Engine, make_simulation
 
 MODEL = build_scene(SceneCfg())
 LIVE = ("qpos", "qvel", "ctrl", "sensordata", "actuator_force")

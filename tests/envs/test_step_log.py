@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 import torch
 
-from envs.curriculum import Curriculum
-from envs.step_log import curriculum_log, episode_log, gait_log
+from mute.envs.curriculum import Curriculum
+from mute.envs.step_log import curriculum_log, episode_log, gait_log
 
 
 def _make_footfalls(touchdown) -> Any:

@@ -7,7 +7,7 @@ import math
 import pytest
 import torch
 
-from envs.terrain import FlatTerrain, HeightMapCfg, Terrain
+from mute.envs.terrain import FlatTerrain, HeightMapCfg, Terrain
 
 
 class _Slope(Terrain):

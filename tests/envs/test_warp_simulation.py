@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 import torch
 
-from envs.randomization import RandomizationCfg, randomize_physics
-from envs.scene import SceneCfg, build_scene
-from envs.simulation import BatchSimulation, make_simulation
-from envs.warp_simulation import WarpSimulation
+from mute.envs.randomization import RandomizationCfg, randomize_physics
+from mute.envs.scene import SceneCfg, build_scene
+from mute.envs.simulation import BatchSimulation, make_simulation
+from mute.envs.warp_simulation import WarpSimulation
 
 MODEL = build_scene(SceneCfg(), foot_samples=4)
 

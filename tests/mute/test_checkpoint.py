@@ -14,10 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from places import REPOSITORY
 
 from mute.checkpoint import CheckpointError, latest_checkpoint, load_checkpoint, save_checkpoint
-
-REPO = Path(__file__).resolve().parents[2]
 
 
 def _make_training_state() -> dict[str, object]:
@@ -117,7 +116,7 @@ save_checkpoint(path, {"weight": torch.full((1000,), 2.0)})
 def test_a_kill_while_saving_leaves_a_whole_checkpoint(tmp_path, stage, survivor):
     path = tmp_path / "model_1.pt"
     save_checkpoint(path, {"weight": torch.full((1000,), 1.0)})
-    child = subprocess.run([sys.executable, "-c", KILLED_WRITER, stage, str(path)], cwd=REPO)
+    child = subprocess.run([sys.executable, "-c", KILLED_WRITER, stage, str(path)], cwd=REPOSITORY)
     assert child.returncode == -signal.SIGKILL
     assert torch.equal(load_checkpoint(path)["weight"], torch.full((1000,), survivor))
 

@@ -7,8 +7,8 @@ import dataclasses
 import pytest
 import yaml
 
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg, from_plain, to_plain
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.tasks import make_task, task_names
 
 

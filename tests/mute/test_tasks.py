@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from envs.rewards import TERMS
-from mute.errors import MuteError
+from mute.envs.rewards import TERMS
+from mute.support.errors import MuteError
 from mute.tasks import DEFAULT_TASK, make_task, task_names
 
 TABLE_I = {

@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch.nn import functional
 
-from networks.elu import ELU
+from mute.networks.elu import ELU
 
 
 def test_it_is_within_1e_7_of_the_exact_value():

@@ -7,7 +7,7 @@ import math
 import pytest
 import torch
 
-from networks import Estimator, EstimatorCfg
+from mute.networks import Estimator, EstimatorCfg
 
 OBS_DIM, NUM_HEIGHTS, NUM_ENVS, NUM_STEPS = 5, 6, 3, 7
 

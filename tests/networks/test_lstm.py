@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from networks.lstm import Weights, lstm_sequence, lstm_step
+from mute.networks.lstm import Weights, lstm_sequence, lstm_step
 
 NUM_STEPS, NUM_ENVS, OBS_DIM, WIDTH = 6, 5, 3, 4
 

@@ -10,9 +10,9 @@ import torch
 from torch import nn
 from torch.nn.utils import prune
 
-from networks import perceptron as module
-from networks.elu import ELU
-from networks.perceptron import perceptron
+from mute.networks import perceptron as module
+from mute.networks.elu import ELU
+from mute.networks.perceptron import perceptron
 
 NUM_ROWS, WIDTHS = 26, (7, 16, 24, 8, 3)
 

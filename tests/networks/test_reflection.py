@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import nn
 
-from networks.reflection import Reflection, tie_layer, tie_mlp, tie_vector
+from mute.networks.reflection import Reflection, tie_layer, tie_mlp, tie_vector
 
 SOURCE = Reflection((1, 0, 2, 3), (1.0, 1.0, -1.0, 1.0))
 TARGET = Reflection((0, 2, 1), (-1.0, -1.0, -1.0))

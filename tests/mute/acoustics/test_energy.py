@@ -7,9 +7,9 @@ from sound_helpers import FEET, FLOORS, a_weighted_level, make_block, random_wal
 from mute.acoustics.contacts import ContactBlock
 from mute.acoustics.energy import EnergyMeter, impact_exposure
 from mute.acoustics.floors import FLOORS as FLOOR_TABLE
-from mute.acoustics.levels import P_REF
+from mute.acoustics.metering.levels import P_REF
+from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
 from mute.acoustics.microphone import Microphone
-from mute.acoustics.sound_level_meter import SoundLevelMeter
 from mute.acoustics.soundscape import SOURCES, Soundscape
 
 

@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.quadruped_env import QuadrupedEnv
-from envs.scene import FOOT_RADIUS, LEGS
-from envs.simulation import BatchSimulation
 from mute.acoustics.contacts import Impacts
 from mute.acoustics.recorder import Recorder
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.scene import FOOT_RADIUS, LEGS
+from mute.envs.simulation import BatchSimulation
 
 GRAVITY = 9.81
 TIMESTEP = 0.001

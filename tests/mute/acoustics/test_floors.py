@@ -5,7 +5,7 @@ import math
 import pytest
 
 from mute.acoustics.floors import FLOORS, FOOT_STIFFNESS, find_floors
-from mute.acoustics.impacts import contact_time
+from mute.acoustics.sources.impacts import contact_time
 
 
 def test_an_unknown_floor_is_refused_by_name():

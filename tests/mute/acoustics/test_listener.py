@@ -8,19 +8,19 @@ from itertools import count
 import numpy as np
 import pytest
 import torch
+from places import SHIPPED_POLICY
 
-from envs.quadruped_env import QuadrupedEnv
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.acoustics.audible_env import listening_cfg, make_listening_env
+from mute.acoustics.files.wav import read_wav
 from mute.acoustics.gains import load_gains
-from mute.acoustics.levels import LevelDetector
 from mute.acoustics.listener import SAMPLE_RATE, Listener
+from mute.acoustics.metering.levels import LevelDetector
 from mute.acoustics.tally import HeardLevels
-from mute.acoustics.wav import read_wav
-from mute.command_lines.arguments import REPOSITORY
 from mute.controllers import LearnedController, load_policy
-from mute.errors import MuteError
-from mute.evaluation.listening import listening_cfg, make_listening_env
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.evaluation.trials import evaluation_cfg, run_trial
+from mute.support.errors import MuteError
 
 SETTLE = 0.5
 
@@ -53,7 +53,7 @@ def _walk(env: QuadrupedEnv, listener: Listener, steps: int, upset: int | None =
 
 def _policy_trial(upset: int | None, from_energies: bool) -> tuple[HeardLevels, float]:
     """Return the levels of a robot that may be upset in mid-trial, and its loudest reading."""
-    policy = load_policy(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
+    policy = load_policy(SHIPPED_POLICY)
     env = make_listening_env(evaluation_cfg(policy.cfg.env, 1, 20.0, seed=1), "tile")
     listener = Listener(env, ["tile"], gains=load_gains(), from_energies=from_energies)
     steps = count()

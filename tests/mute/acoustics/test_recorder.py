@@ -1,4 +1,4 @@
-"""Tests of what is recorded for the ear: landings, sliding, effective masses."""
+"""Tests of what is recorded to be heard: landings, sliding, effective masses."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import torch
 
-from envs.quadruped_env import QuadrupedEnv
-from envs.quadruped_env_cfg import QuadrupedEnvCfg
-from envs.randomization import RandomizationCfg
-from envs.scene import FloorPatch, SceneCfg
 from mute.acoustics.recorder import Recorder, effective_mass
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.randomization import RandomizationCfg
+from mute.envs.scene import FloorPatch, SceneCfg
 
 
 def _make_env(**scene) -> QuadrupedEnv:

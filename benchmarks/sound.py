@@ -1,0 +1,209 @@
+"""Measure the speed and the memory of hearing robots: python -m benchmarks.sound.
+
+The policy that ships walks on wood. The whole is what `evaluate.py noise` does. Of its parts are
+timed: to find landings and sliding in the physics, to make and measure the sound, and, for one
+robot, to have levels without sound. What is timed happens once, as it does in use. A walk of twice
+the length, in a process of its own as the first one, shows whether memory grows with it.
+"""
+
+from __future__ import annotations
+
+from mute.support.threads import configure_threads
+
+configure_threads()  # before torch is imported
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from rich.progress import track
+
+from mute.acoustics.audible_env import make_listening_env
+from mute.acoustics.contacts import ContactBlock
+from mute.acoustics.energy import EnergyMeter
+from mute.acoustics.gains import load_gains
+from mute.acoustics.listener import SAMPLE_RATE
+from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
+from mute.acoustics.recorder import Recorder
+from mute.acoustics.soundscape import Soundscape
+from mute.command_lines.arguments import (
+    check_trials,
+    command_line,
+    make_directory,
+    parse,
+)
+from mute.command_lines.sound_options import load_audible_policy
+from mute.controllers import LearnedController
+from mute.controllers.learned import Policy
+from mute.evaluation.noise_levels import SETTLE_TIME, NoiseSetting, measure_noise
+from mute.evaluation.tables import print_table, write_json
+from mute.evaluation.trials import evaluation_cfg, run_trial
+from mute.support.errors import run_cli
+from mute.support.processes import call_apart, peak_memory_mb
+from mute.support.provenance import machine_kind
+from mute.support.resources import RESOURCES
+from mute.tasks import DEFAULT_TASK
+
+__all__ = ["Part", "SoundBenchmarkArgs", "Times", "measure"]
+
+_FLOOR = "wood"
+_SPEED = 0.5
+"""Commanded speed at beta = 0, m/s, as in the calibration."""
+_SEED = 1
+_STRETCH = 0.5
+"""Time that is worked on at once, s, as in a `Listener`."""
+
+
+@dataclass
+class SoundBenchmarkArgs:
+    """Arguments of the benchmark."""
+
+    policy: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
+    """The policy that walks."""
+    trials: int = 64
+    """Robots that walk side by side."""
+    seconds: float = 10.0
+    """Measured length of a trial, s; for the memory, it is walked for twice as long, too."""
+    json: bool = False
+    """Print JSON and nothing else."""
+    out: Path | None = None
+    """File to write the JSON to as well."""
+
+
+@dataclass
+class Part:
+    """What one part of the work takes."""
+
+    name: str
+    """`whole`: physics, policy, sound and meter. `recorder`: finding landings and sliding in what
+    was copied from the physics. `sound`: making and measuring the sound. Of one robot without
+    sound: `lone recorder`, `lone energies`: the levels, and `lone walk`: both with all else."""
+    robots: int
+    """Robots side by side."""
+    simulated: float
+    """Length of the walk, s: of the trial and of `SETTLE_TIME` before it."""
+    wall: float
+    """What it took, s."""
+    real_time: float
+    """Length of the walk over what it took."""
+
+
+@dataclass
+class Times:
+    """What a walk takes."""
+
+    parts: list[Part]
+    """Its parts, the whole first."""
+    memory_mb: float
+    """Largest memory of the process after the whole, MB."""
+
+
+def measure(policy_file: str, trials: int, seconds: float, whole_alone: bool) -> Times:
+    """Return what a walk takes, for a process that did nothing else before.
+
+    Args:
+        policy_file: The policy that walks.
+        trials: Robots side by side.
+        seconds: Measured length of a trial, s.
+        whole_alone: Leave out the parts of the whole.
+    """
+    policy, gains = load_audible_policy(Path(policy_file)), load_gains()
+    simulated = seconds + SETTLE_TIME
+
+    def part(name: str, robots: int, wall: float) -> Part:
+        return Part(name, robots, simulated, wall, simulated / wall)
+
+    start = time.perf_counter()
+    measure_noise(policy, _FLOOR, [NoiseSetting(0.0, _SPEED)], trials, seconds, _SEED, gains)
+    parts = [part("whole", trials, time.perf_counter() - start)]
+    memory = peak_memory_mb()
+    if whole_alone:
+        return Times(parts, memory)
+    soundscape = Soundscape(trials, [_FLOOR], sample_rate=SAMPLE_RATE, seed=_SEED, gains=gains)
+    meter = SoundLevelMeter(SAMPLE_RATE, trials)
+    finding, hearing, _ = _walk(
+        policy, trials, simulated, lambda block: meter.update(soundscape.render(block))
+    )
+    parts += [part("recorder", trials, finding), part("sound", trials, hearing)]
+    energies = EnergyMeter(1, [_FLOOR], gains=gains)
+    finding, hearing, walking = _walk(policy, 1, simulated, energies.update)
+    parts += [part("lone recorder", 1, finding), part("lone energies", 1, hearing)]
+    parts.append(part("lone walk", 1, walking))
+    return Times(parts, memory)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    Raises:
+        MuteError: If an argument is bad, or the policy cannot be used.
+    """
+    argv = command_line() if argv is None else list(argv)
+    args = parse(SoundBenchmarkArgs, argv, "Measure the speed and memory of hearing robots.")
+    check_trials(args.trials, args.seconds)
+    policy = load_audible_policy(args.policy)
+    if args.out is not None:
+        make_directory(args.out.parent)
+    work = ((args.seconds, False), (2.0 * args.seconds, True))
+    once, twice = (
+        call_apart("benchmarks.sound", "measure", str(args.policy), args.trials, *walk)
+        for walk in (work if args.json else track(work, "walks"))
+    )
+    content = {
+        "task": policy.task,
+        "floor": _FLOOR,
+        "trials": args.trials,
+        "seconds": args.seconds,
+        "machine": machine_kind(),
+        "parts": once["parts"],
+        "memory_mb": once["memory_mb"],
+        "memory_growth_mb": twice["memory_mb"] - once["memory_mb"],
+    }
+    if args.out is not None:
+        write_json(args.out, content)
+    if args.json:
+        print(json.dumps(content))
+    else:
+        print_table(content["machine"], once["parts"], list(Part.__annotations__))
+        print(
+            f"memory of the whole: {content['memory_mb']:.0f} MB; for twice the seconds "
+            f"{content['memory_growth_mb']:+.0f} MB"
+        )
+    return 0
+
+
+def _walk(
+    policy: Policy, robots: int, simulated: float, hear: Callable[[ContactBlock], object]
+) -> tuple[float, float, float]:
+    """Walk, and return the times of the recorder, of `hear`, and of everything, s."""
+    env = make_listening_env(evaluation_cfg(policy.cfg.env, robots, simulated, _SEED), _FLOOR)
+    recorder = Recorder(env)
+    steps, at_once = round(simulated / env.step_dt), round(_STRETCH / env.step_dt)
+    made, finding, hearing = 0, 0.0, 0.0
+
+    def listen(_: object, dones: torch.Tensor) -> None:
+        nonlocal made, finding, hearing
+        made += 1
+        if bool(dones.any()):
+            recorder.restart(dones.numpy(), env.unstable.numpy())
+        if made % at_once and made < steps:
+            return
+        start = time.perf_counter()
+        block = recorder.take()
+        found = time.perf_counter()
+        hear(block)
+        finding += found - start
+        hearing += time.perf_counter() - found
+
+    command = torch.tensor((_SPEED, 0.0, 0.0, 0.0))
+    controller = LearnedController(policy, robots)
+    start = time.perf_counter()
+    run_trial(env, controller, command, steps, listen)
+    return finding, hearing, time.perf_counter() - start
+
+
+if __name__ == "__main__":
+    run_cli(main)

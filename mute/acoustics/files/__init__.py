@@ -1,0 +1,1 @@
+"""Sound in files, read and written in blocks."""

@@ -1,0 +1,1 @@
+"""How loud a sound is: weighting, detector, readings, for robots and recordings alike."""

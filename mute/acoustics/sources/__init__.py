@@ -1,0 +1,1 @@
+"""What sounds of a robot: landings, scuffing, drives and the fan."""

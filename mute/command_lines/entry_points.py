@@ -1,0 +1,87 @@
+"""How every command starts: the process is set up first, and only then is torch imported.
+
+Nothing else changes the process it runs in: whoever imports MUTE as a library keeps the threads and
+the memory as they are.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from typing import NoReturn
+
+from mute.rendering.backend import configure_rendering
+from mute.support.errors import run_cli
+from mute.support.memory import keep_freed_memory
+from mute.support.threads import configure_threads
+
+__all__ = [
+    "benchmark",
+    "calibrate",
+    "card",
+    "evaluate",
+    "export",
+    "meter",
+    "play",
+    "release",
+    "train",
+]
+
+
+def train() -> NoReturn:
+    """Learn a task: `train.py`."""
+    keep_freed_memory()
+    _start("train")
+
+
+def play() -> NoReturn:
+    """Watch, record and steer a policy: `play.py`."""
+    _start("play", renders=True)
+
+
+def evaluate() -> NoReturn:
+    """Measure policies: `evaluate.py`."""
+    _start("evaluate", renders=True)
+
+
+def export() -> NoReturn:
+    """Export a policy as one ONNX file: `python -m mute.export`."""
+    _start("export")
+
+
+def meter() -> NoReturn:
+    """Measure recordings with a sound level meter: `python -m mute.acoustics.meter`."""
+    _start("meter")
+
+
+def calibrate() -> NoReturn:
+    """Fit the gains of the sound model: `python -m mute.acoustics.calibration`."""
+    _start("calibrate")
+
+
+def benchmark() -> NoReturn:
+    """Measure the speed of training: `python -m mute.benchmark`."""
+    keep_freed_memory()
+    _start("benchmark")
+
+
+def release() -> NoReturn:
+    """Make the files of a policy that ships: `python -m mute.release`."""
+    _start("release")
+
+
+def card() -> NoReturn:
+    """Print a policy's card as tables: `python -m mute.card`."""
+    _start("card")
+
+
+def _start(command: str, renders: bool = False) -> NoReturn:
+    """Run the main function of a command's module and end the process with its status."""
+
+    def main() -> int | None:
+        configure_threads()  # before torch is imported
+        if renders:
+            configure_rendering(sys.argv[1:])  # before mujoco is
+        return importlib.import_module(f"mute.command_lines.{command}").main()
+
+    run_cli(main)

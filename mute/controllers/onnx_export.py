@@ -1,0 +1,171 @@
+"""A policy as one ONNX file.
+
+Estimator, normaliser and actor become one graph whose recurrent state goes in and comes out, so
+that whoever runs it keeps the state. The metadata says how to make its input and what its output
+means; `examples/run_onnx.py` is a program that knows nothing else.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import logging
+import warnings
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import mujoco
+import onnx
+import torch
+from torch import nn
+
+from mute.controllers.learned import Policy
+from mute.envs.observations import OBS_DIM, OBSERVATION_WIDTHS
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.scene import JOINT_NAMES, build_scene
+from mute.learning.estimated_env import estimate_group
+from mute.support.errors import MuteError
+from mute.support.files import replace_file
+
+__all__ = ["export_policy"]
+
+_OPSET = 18
+_INPUTS = ("obs", "h_in", "c_in")
+_OUTPUTS = ("action", "phase", "base_lin_vel", "h_out", "c_out")
+_RECURRENT_STATE = {"h_in": "h_out", "c_in": "c_out"}
+_COMMAND_NAMES = ("lin_vel_x", "lin_vel_y", "ang_vel_z", "beta")
+
+
+def export_policy(policy: Policy, out: Path) -> None:
+    """Write a policy as one self-contained ONNX file, atomically.
+
+    Inputs: `obs` (1, 46), the scaled observation, and the LSTM state `h_in` and `c_in`, each
+    (1, lstm_hidden), zero at the start. Outputs: `action` (1, 12), the mean action in units of
+    `action_scale`; `phase` (1, 4), in [0, 1], feet in the order FR, FL, RR, RL; `base_lin_vel`
+    (1, 3), in m/s in the body frame; and the new state `h_out` and `c_out`.
+
+    The metadata has the keys of mjlab's exports, numbers in full precision, and some more:
+
+    - `joint_names`, `joint_stiffness` (N m/rad), `joint_damping` (N m s/rad), `default_joint_pos`
+      (rad), `action_scale` (rad): one entry per joint, comma-separated. The set point of a joint
+      is `default_joint_pos + action_scale * action`.
+    - `observation_names`, `command_names`: comma-separated, in the order of the columns.
+    - `observation_scales` and `recurrent_state`: JSON, name to factor and input to output.
+    - `control_dt` (s) and `action_clip`, the bound on an action's magnitude.
+
+    Args:
+        policy: What to export; it is not changed.
+        out: File to write or replace; its directory is made if need be.
+
+    Raises:
+        MuteError: If the file cannot be written.
+    """
+    model = _graph(policy)
+    onnx.helper.set_model_props(model, _metadata(policy.cfg.env))
+    onnx.checker.check_model(model)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(out, model.SerializeToString())
+    except OSError as error:
+        raise MuteError(f"cannot write {out}: {error.strerror}") from error
+
+
+class _PolicyGraph(nn.Module):
+    """Estimator and actor as a function of the observation and the LSTM state."""
+
+    def __init__(self, policy: Policy) -> None:
+        super().__init__()
+        self.estimator = policy.estimator
+        self.actor = policy.actor.as_onnx(verbose=False)
+        self.groups = policy.actor.obs_groups
+        self.with_phase = policy.cfg.agent.estimation.actor_uses_phase
+
+    def forward(
+        self, obs: torch.Tensor, hidden: torch.Tensor, cell: torch.Tensor
+    ) -> tuple[torch.Tensor, ...]:
+        """Take one control step; shapes as in `export_policy`."""
+        estimate, (hidden, cell) = self.estimator.step(obs, (hidden, cell))
+        groups = {
+            "policy": obs,
+            "estimate": estimate_group(estimate, self.estimator, self.with_phase),
+        }
+        action = self.actor(torch.cat([groups[name] for name in self.groups], dim=-1))
+        return action, estimate.phase, estimate.base_lin_vel, hidden, cell
+
+
+def _graph(policy: Policy) -> onnx.ModelProto:
+    """Trace the policy with zeros; the graph has no branch that they could hide."""
+    arguments = (torch.zeros(1, OBS_DIM), *policy.estimator.initial_state(1, "cpu"))
+    with torch.no_grad(), _quiet_exporter():
+        program = torch.onnx.export(
+            _PolicyGraph(policy).eval(),
+            arguments,
+            input_names=_INPUTS,
+            output_names=_OUTPUTS,
+            opset_version=_OPSET,
+            dynamo=True,
+            external_data=False,
+            verbose=False,
+        )
+    if program is None:
+        raise RuntimeError("torch.onnx.export returned no program")
+    model = program.model_proto
+    _strip_notes(model.graph)
+    return model
+
+
+@contextlib.contextmanager
+def _quiet_exporter() -> Iterator[None]:
+    """Hold back what torch's exporter says of itself; its errors are exceptions."""
+    logger = logging.getLogger("torch.onnx")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logger.setLevel(level)
+
+
+def _strip_notes(graph: onnx.GraphProto) -> None:
+    """Drop the exporter's notes, which name paths on the machine that it ran on."""
+    del graph.metadata_props[:]
+    for parts in (graph.node, graph.input, graph.output, graph.value_info, graph.initializer):
+        for part in parts:
+            del part.metadata_props[:]
+            part.doc_string = ""
+
+
+def _metadata(cfg: QuadrupedEnvCfg) -> dict[str, str]:
+    """Return what a program must know to run the graph, see `export_policy`."""
+    # The look is no part of the physics, and may need meshes that are not here.
+    model = build_scene(dataclasses.replace(cfg.scene, look="primitives"))
+    joints = [model.joint(name) for name in JOINT_NAMES]
+    servos = [_servo_of(model, joint.id) for joint in joints]
+    stand = model.key("stand").qpos
+    return {
+        "joint_names": _comma_separated(JOINT_NAMES),
+        "joint_stiffness": _comma_separated(model.actuator_gainprm[servos, 0].tolist()),
+        "joint_damping": _comma_separated((-model.actuator_biasprm[servos, 2]).tolist()),
+        "default_joint_pos": _comma_separated([float(stand[joint.qposadr[0]]) for joint in joints]),
+        "action_scale": _comma_separated([cfg.action_scale] * len(joints)),
+        "action_clip": repr(cfg.action_clip),
+        "observation_names": _comma_separated(list(OBSERVATION_WIDTHS)),
+        "observation_scales": json.dumps(
+            {name: cfg.observations.scales[name] for name in OBSERVATION_WIDTHS}
+        ),
+        "command_names": _comma_separated(_COMMAND_NAMES),
+        "control_dt": repr(cfg.step_dt),
+        "recurrent_state": json.dumps(_RECURRENT_STATE),
+    }
+
+
+def _servo_of(model: mujoco.MjModel, joint: int) -> int:
+    """Return the actuator that drives a joint."""
+    return model.actuator_trnid[:, 0].tolist().index(joint)
+
+
+def _comma_separated(values: Sequence[str | float]) -> str:
+    return ",".join(value if isinstance(value, str) else repr(value) for value in values)

@@ -1,0 +1,1 @@
+"""The long walk over floors of several kinds: its course, the way along it, and its map."""

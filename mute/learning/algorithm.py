@@ -1,0 +1,121 @@
+"""rsl_rl's PPO with the estimator beside it: learnt, saved and moved together, never mixed."""
+
+from __future__ import annotations
+
+from itertools import chain
+from typing import Any
+
+import torch
+from rsl_rl.algorithms import PPO
+from rsl_rl.env import VecEnv
+from tensordict import TensorDict
+
+from mute.learning.distributed import Ranks
+from mute.learning.estimated_env import EstimatedEnv
+from mute.learning.estimator_trainer import EstimatorTrainer
+from mute.learning.optimizer import FusedAdam
+from mute.learning.storage import PreparedModel, PreparedStorage
+from mute.networks.estimator import State
+from mute.support.threads import use_learning_threads
+
+__all__ = ["EstimatorPPO"]
+
+
+class EstimatorPPO(PPO):
+    """PPO whose update first trains the estimator, on the rollout before the stored one.
+
+    The actor and the critic read the estimates as they were stored, so the probability ratio is 1
+    on the first mini-batch, and no gradient of theirs reaches the estimator.
+    """
+
+    actor: PreparedModel  # pyright: ignore[reportIncompatibleVariableOverride]
+    critic: PreparedModel  # pyright: ignore[reportIncompatibleVariableOverride]
+    env: EstimatedEnv
+    """Where the estimator runs."""
+    trainer: EstimatorTrainer
+    """What the estimator learns by."""
+    ranks: Ranks
+    """Processes that learn together."""
+
+    @staticmethod
+    def construct_algorithm(obs: TensorDict, env: VecEnv, cfg: dict, device: str) -> EstimatorPPO:
+        """Build everything, see `PPO.construct_algorithm`; the storage prepares its batches."""
+        steps = cfg["num_steps_per_env"]
+        algorithm = PPO.construct_algorithm(obs, env, cfg, device)
+        assert isinstance(algorithm, EstimatorPPO)  # what the configuration names
+        models = [algorithm.actor, algorithm.critic]
+        parameters = chain(algorithm.actor.parameters(), algorithm.critic.parameters())
+        algorithm.optimizer = FusedAdam(parameters, algorithm.learning_rate)
+        storage = PreparedStorage("rl", env.num_envs, steps, obs, [env.num_actions], device)
+        storage.models = [model for model in models if isinstance(model, PreparedModel)]
+        algorithm.storage = storage
+        return algorithm
+
+    def attach(self, env: EstimatedEnv, trainer: EstimatorTrainer, ranks: Ranks) -> None:
+        """Take on the estimator; to be called once, before anything else.
+
+        A live module cannot come through rsl_rl's configuration, which is deep-copied.
+        """
+        self.env, self.trainer, self.ranks = env, trainer, ranks
+        self._rollout_state: State = env.state_before
+
+    def act(self, obs: TensorDict) -> torch.Tensor:
+        """Sample actions, see `PPO.act`; remember the LSTM state that the rollout began with."""
+        if self.storage.step == 0:
+            self._rollout_state = self.env.state_before
+            use_learning_threads()  # whatever ran between two rollouts; the environment keeps them
+        return super().act(obs)
+
+    def compute_returns(self, obs: TensorDict) -> None:
+        """Compute returns and advantages, see `PPO.compute_returns`.
+
+        rsl_rl normalises the advantages of each rank by themselves; here it is those of all.
+        """
+        super().compute_returns(obs)
+        if not self.ranks.several:
+            return
+        advantages = self.storage.returns - self.storage.values
+        count = advantages.numel() * self.ranks.world_size
+        centred = advantages - self.ranks.mean(advantages.mean())
+        variance = self.ranks.mean(centred.square().mean()) * count / (count - 1)
+        self.storage.advantages = centred / (variance.sqrt() + 1e-8)
+
+    def update(self) -> dict[str, float]:
+        """Train the estimator, then actor and critic; return the mean losses and errors."""
+        use_learning_threads()
+        # Clones made outside inference mode are ordinary tensors, which autograd accepts.
+        hidden, cell = self._rollout_state
+        losses = self.trainer.update(self.storage, (hidden.clone(), cell.clone()), self.ranks)
+        losses |= super().update()
+        self.env.refresh()
+        return losses
+
+    def train_mode(self) -> None:
+        """Set train mode for all networks."""
+        super().train_mode()
+        self.trainer.estimator.train()
+
+    def eval_mode(self) -> None:
+        """Set evaluation mode for all networks."""
+        super().eval_mode()
+        self.trainer.estimator.eval()
+
+    def save(self) -> dict[str, Any]:
+        """Return the state of all networks and both optimisers."""
+        return super().save() | {
+            "estimator_state_dict": self.trainer.estimator.state_dict(),
+            "estimator_trainer": self.trainer.state_dict(),
+        }
+
+    def load(self, loaded_dict: dict, load_cfg: dict | None, strict: bool) -> bool:
+        """Load what `save` returned, see `PPO.load`."""
+        self.trainer.estimator.load_state_dict(loaded_dict["estimator_state_dict"], strict=strict)
+        if load_cfg is None or load_cfg.get("optimizer"):
+            self.trainer.load_state_dict(loaded_dict["estimator_trainer"])
+        return super().load(loaded_dict, load_cfg, strict)
+
+    def broadcast_parameters(self) -> None:
+        """Give every process the parameters of the first."""
+        super().broadcast_parameters()
+        for tensor in self.trainer.estimator.state_dict().values():
+            torch.distributed.broadcast(tensor, src=0)

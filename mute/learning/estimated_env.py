@@ -1,0 +1,159 @@
+"""The estimator in the loop: an environment that also publishes what is estimated of it.
+
+rsl_rl sees one more observation group, `estimate`; its PPO and its models stay as they are, and no
+policy gradient can reach the estimator.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from rsl_rl.env import VecEnv
+from tensordict import TensorDict
+
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.networks.estimator import Estimate, Estimator, State
+from mute.support.threads import use_collection_threads, use_learning_threads
+
+__all__ = ["EstimatedEnv", "estimate_group"]
+
+
+def estimate_group(estimate: Estimate, estimator: Estimator, with_phase: bool) -> torch.Tensor:
+    """Return the observation group `estimate`: velocity, normalised heights, latent, phase.
+
+    Args:
+        estimate: Estimates of one step. Shapes: (num_envs, ...).
+        estimator: The estimator that made them, for the heights' scale.
+        with_phase: Whether the phase is part of the group.
+    """
+    cfg = estimator.cfg
+    heights = (estimate.heights - cfg.height_offset) / cfg.height_scale
+    parts = [estimate.base_lin_vel, heights, estimate.latent]
+    return torch.cat([*parts, estimate.phase] if with_phase else parts, dim=-1)
+
+
+class EstimatedEnv(VecEnv):
+    """Wraps an environment and runs the estimator between it and the algorithm.
+
+    Order within `step`: the phase estimated from o_t goes to the environment, which rewards by it;
+    the environment steps; the LSTM state of finished episodes is zeroed; o_{t+1}, which is the new
+    episode's first observation there, is consumed. Nothing is changed in place: rsl_rl keeps
+    references.
+    """
+
+    def __init__(
+        self, env: QuadrupedEnv, estimator: Estimator, device: str, with_phase: bool = True
+    ) -> None:
+        """Consume the environment's first observation.
+
+        Args:
+            env: The environment.
+            estimator: The estimator, on `device`.
+            device: Device of the networks; the environment may live on another.
+            with_phase: Whether `estimate` holds the phase.
+        """
+        self.env = env
+        self.estimator = estimator
+        self.device = torch.device(device)
+        self.num_envs = env.num_envs
+        self.num_actions = env.num_actions
+        self.max_episode_length = env.max_episode_length
+        self.with_phase = with_phase
+        self.state: State = estimator.initial_state(env.num_envs, self.device)
+        """LSTM state after the current observation."""
+        self.state_before: State = self.state
+        """LSTM state before it, zero where an episode has just begun."""
+        self._consume(env.get_observations(), self.state)
+
+    @property
+    def cfg(self) -> QuadrupedEnvCfg:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The environment's configuration."""
+        return self.env.cfg
+
+    @property
+    def episode_length_buf(self) -> torch.Tensor:
+        """Age of every episode in control steps. Shape: (num_envs,)."""
+        return self.env.episode_length_buf
+
+    @episode_length_buf.setter
+    def episode_length_buf(  # pyright: ignore[reportIncompatibleVariableOverride]
+        self, value: torch.Tensor
+    ) -> None:
+        self.env.episode_length_buf = value.to(self.env.device)
+
+    @property
+    def estimate(self) -> Estimate:
+        """What is estimated from the current observation. Shapes: (num_envs, ...)."""
+        return self._estimate
+
+    def get_observations(self) -> TensorDict:
+        """Return the current observations, without side effects."""
+        return self._observations
+
+    def step(
+        self, actions: torch.Tensor
+    ) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
+        """Advance by one control step, see the class."""
+        self.env.set_estimated_phase(self._estimate.phase.to(self.env.device))
+        use_collection_threads()
+        observations, rewards, dones, extras = self.env.step(actions.to(self.env.device))
+        use_learning_threads()
+        ended = dones.to(self.device).unsqueeze(1)
+        hidden, cell = self.state
+        self._consume(observations, (hidden.masked_fill(ended, 0.0), cell.masked_fill(ended, 0.0)))
+        return self._observations, rewards, dones, extras
+
+    @torch.inference_mode()
+    def refresh(self) -> None:
+        """Estimate the current observation anew, with the estimator as it now is.
+
+        After the estimator has learnt, the observation that opens the next rollout must carry the
+        new estimate, or the stored rollout could not be reproduced. The loop holds a reference to
+        the group's tensor, so here alone it is overwritten.
+        """
+        use_learning_threads()  # products differ in the last bit with the number of threads
+        published = self._observations["estimate"]
+        self._estimate, self.state = self.estimator.step(
+            self._observations["policy"], self.state_before
+        )
+        published.copy_(estimate_group(self._estimate, self.estimator, self.with_phase))
+
+    def restart(self, step_count: int) -> None:
+        """Begin new episodes of all robots in the middle of a training.
+
+        Args:
+            step_count: Control steps trained so far, by which the curricula go.
+        """
+        self.env.step_count = step_count
+        observations = self.env.reset()
+        use_learning_threads()
+        self._consume(observations, self.estimator.initial_state(self.num_envs, self.device))
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that is needed to continue bit for bit, the environment included."""
+        return {
+            "env": self.env.state_dict(),
+            "state_before": [part.clone() for part in self.state_before],
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Continue from a `state_dict`; the estimator's weights must be loaded before.
+
+        Raises:
+            ValueError: If it belongs to another number of environments.
+        """
+        self.env.load_state_dict(state["env"])
+        hidden, cell = (part.to(self.device) for part in state["state_before"])
+        use_learning_threads()  # as in `refresh`, whose estimate this makes again
+        self._consume(self.env.get_observations(), (hidden, cell))
+
+    @torch.no_grad()
+    def _consume(self, observations: TensorDict, state_before: State) -> None:
+        observations = observations.to(self.device)
+        self.state_before = state_before
+        self._estimate, self.state = self.estimator.step(observations["policy"], state_before)
+        groups = dict(observations.items())
+        groups["estimate"] = estimate_group(self._estimate, self.estimator, self.with_phase)
+        self._observations = TensorDict(groups, batch_size=[self.num_envs], device=self.device)

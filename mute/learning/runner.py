@@ -1,0 +1,300 @@
+"""rsl_rl's on-policy runner, with the estimator in its loop and checkpoints that lose nothing."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import io
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import torch
+from rsl_rl.runners import OnPolicyRunner
+
+from mute.checkpoint import CheckpointError, first_line, load_checkpoint, save_checkpoint
+from mute.config import TaskCfg, to_plain
+from mute.envs.observations import OBS_DIM
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.learning.algorithm import EstimatorPPO
+from mute.learning.distributed import Ranks
+from mute.learning.estimated_env import EstimatedEnv
+from mute.learning.estimator_trainer import EstimatorTrainer
+from mute.learning.logger import TrainingLogger
+from mute.learning.symmetry import groups, tie_actor_critic, tie_estimator
+from mute.networks.estimator import Estimator
+from mute.support.threads import core_share, use_collection_threads
+
+__all__ = ["MuteRunner", "NoiseProbe", "Progress", "policy_part"]
+
+Progress = Callable[[int, int, dict[str, float]], None]
+
+NoiseProbe = Callable[[dict[str, Any]], dict[str, float]]
+"""Takes a `policy_part` and returns the modelled noise levels of its policy by curve, dBA. It uses
+no random numbers of torch's common generator but such as it puts back."""
+
+_POLICY_KEYS = ("task", "config", "iter", "actor_state_dict", "estimator_state_dict")
+
+
+def policy_part(checkpoint: dict[str, Any]) -> dict[str, Any]:
+    """Return the small part of a checkpoint that is needed to run its policy."""
+    return {key: checkpoint[key] for key in _POLICY_KEYS}
+
+
+class MuteRunner(OnPolicyRunner):
+    """Learns a task: environment, estimator and PPO in rsl_rl's loop; saves and resumes.
+
+    With several ranks, each has the configured number of robots. `train` and `save` are then to be
+    called on all of them; nothing else waits for the others.
+    """
+
+    alg: EstimatorPPO  # pyright: ignore[reportIncompatibleVariableOverride]
+    env: EstimatedEnv  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    def __init__(
+        self,
+        task: str,
+        cfg: TaskCfg,
+        log_dir: Path | None,
+        device: str = "cpu",
+        on_iteration: Progress | None = None,
+        ranks: Ranks | None = None,
+        noise_probe: NoiseProbe | None = None,
+    ) -> None:
+        """Build everything.
+
+        Args:
+            task: Name of the task, for the checkpoint.
+            cfg: Its configuration.
+            log_dir: Directory of the run; None keeps nothing.
+            device: Device of the networks and, unless `env.engine` forbids it, of the physics.
+            on_iteration: Called with (iteration, total, scalars) after each iteration.
+            ranks: Processes that learn together, which all are given the same configuration.
+            noise_probe: Measures how loud the policy walks, every `agent.noise_interval`; None
+                leaves that out.
+        """
+        self.ranks = ranks or Ranks()
+        torch.manual_seed(self.ranks.seed(cfg.env.seed))
+        self.task, self.task_cfg = task, cfg
+        env = QuadrupedEnv(_own_share(cfg.env, self.ranks), device)
+        estimation = cfg.agent.estimation
+        estimator = Estimator(OBS_DIM, env.grid.shape[0], estimation.network).to(device)
+        if cfg.agent.symmetric:
+            tie_estimator(env, estimator)
+        estimated = EstimatedEnv(env, estimator, device, estimation.actor_uses_phase)
+        with contextlib.redirect_stdout(io.StringIO()):  # rsl_rl prints its networks
+            super().__init__(
+                estimated, cfg.agent.rsl_rl(), str(log_dir) if log_dir else None, device
+            )
+        feet = env.footfalls
+        trainer = EstimatorTrainer(
+            estimator, estimation, env.privileged_slices, feet.min_steps, feet.max_steps
+        )
+        self.alg.attach(estimated, trainer, self.ranks)
+        if cfg.agent.symmetric:
+            by_group = groups(env, estimator.cfg.latent_dim, estimation.actor_uses_phase)
+            tie_actor_critic(self.alg.actor, self.alg.critic, by_group)
+        self.logger = TrainingLogger(
+            log_dir=str(log_dir) if log_dir else None,
+            cfg=self.cfg,
+            env_cfg=cfg.env,
+            num_envs=estimated.num_envs,
+            device=device,
+            measure=self._measure_noise,
+            on_iteration=self._end_iteration,
+            ranks=self.ranks,
+        )
+        self._noise_probe = noise_probe
+        self._levels: dict[str, float] = {}
+        self.robots_anew = True
+        """Whether robots begin their first episodes, as they do unless `load` finds them saved."""
+        self._on_iteration = on_iteration
+        self._stop_requested = False
+
+    def train(self) -> bool:
+        """Learn until the configured number of iterations; return False if interrupted.
+
+        Ctrl-C ends the current iteration, saves and returns; a second one ends at once.
+        """
+        left = self.task_cfg.agent.iterations - self.current_learning_iteration
+        with self._catch_interrupt():
+            try:
+                self._agree()
+                self.learn(left, init_at_random_ep_len=self.robots_anew)
+            except _StopTraining:
+                if self.logger.log_dir is not None:
+                    self.save(str(self.checkpoint_path()))
+                self.logger.stop_logging_writer()  # writes out the last curves
+                return False
+        return True
+
+    def checkpoint_path(self) -> Path:
+        """Return the path of the checkpoint of the last finished iteration.
+
+        Raises:
+            ValueError: If the run keeps nothing.
+        """
+        if self.logger.log_dir is None:
+            raise ValueError("this run has no log directory")
+        return Path(self.logger.log_dir) / f"model_{self.current_learning_iteration}.pt"
+
+    def save(self, path: str, infos: dict | None = None) -> None:
+        """Save all that is needed to continue bit for bit, atomically; the first rank writes."""
+        own = self._own_state()
+        payload = self.alg.save() | own
+        if self.ranks.several:
+            own["estimator_past"] = payload["estimator_trainer"]["past"]
+            gathered = self.ranks.gather_states({} if self.ranks.first else own)
+            payload["other_ranks"] = gathered[1:]
+        if not self.ranks.first:
+            return
+        payload |= self._about(self.current_learning_iteration) | {"infos": infos}
+        save_checkpoint(Path(path), payload)
+        self.logger.save_model(path, self.current_learning_iteration)
+
+    def load(
+        self,
+        path: str,
+        load_cfg: dict | None = None,
+        strict: bool = True,
+        map_location: str | None = None,
+    ) -> dict:
+        """Continue from a checkpoint.
+
+        One of another number of ranks has no state for each of these: what is learnt, the
+        iterations and the curricula then go on, and the robots begin anew.
+
+        Raises:
+            CheckpointError: If it is damaged, foreign, or of another configuration.
+        """
+        # On the CPU whatever the device: environment, networks and optimisers move what they load
+        # to where they are, and the random states stay where they belong.
+        checkpoint = load_checkpoint(Path(path), map_location or "cpu")
+        try:
+            if self.task_cfg.agent.symmetric and not checkpoint["config"]["agent"]["symmetric"]:
+                raise ValueError("agent.symmetric is true, and its networks were trained without")
+            own = _part_of_rank(checkpoint, self.ranks)
+            checkpoint["estimator_trainer"]["past"] = {} if own is None else own["estimator_past"]
+            self.alg.load(checkpoint, load_cfg, strict)
+            if own is None:
+                self.env.restart(checkpoint["env"]["env"]["step_count"])
+                self.logger.load_totals(checkpoint["logger"])
+            else:
+                self._load_own_state(own)
+        except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
+            reason = first_line(error)
+            raise CheckpointError(f"{path} does not fit this configuration: {reason}") from error
+        self.robots_anew = own is None
+        # The saved iteration is finished.
+        self.current_learning_iteration = checkpoint["iter"] + 1
+        # What was logged after the checkpoint is learnt, and logged, again.
+        self.cfg["logger"]["first_iteration"] = self.current_learning_iteration
+        return checkpoint["infos"] or {}
+
+    @property
+    def _on_cuda(self) -> bool:
+        return torch.device(self.device).type == "cuda"
+
+    def _measure_noise(self, iteration: int) -> dict[str, float]:
+        """Return the modelled noise levels where the iteration is one that measures them, dBA.
+
+        They are the same for all ranks, so the first one measures and the others wait.
+        """
+        interval = self.task_cfg.agent.noise_interval
+        due = interval and (iteration + 1) % interval == 0
+        if self._noise_probe is None or not self.ranks.first or not due:
+            return {}
+        use_collection_threads()
+        self._levels = self._noise_probe(policy_part(self.alg.save() | self._about(iteration)))
+        return self._levels
+
+    def _about(self, iteration: int) -> dict[str, Any]:
+        """Return what a checkpoint says of its policy."""
+        return {"task": self.task, "config": to_plain(self.task_cfg), "iter": iteration}
+
+    def _end_iteration(self, iteration: int, total: int, scalars: dict[str, float]) -> None:
+        if self._on_iteration is not None:
+            # Between two trials the display goes on showing the last one's levels.
+            self._on_iteration(iteration, total, self._levels | scalars)
+        # A signal may reach one rank alone, or another one an iteration later.
+        if self.ranks.any(self._stop_requested) and iteration + 1 < total:
+            raise _StopTraining
+
+    def _configure_multi_gpu(self) -> None:
+        """Tell rsl_rl of the ranks; its own way insists on CUDA, and makes the process group."""
+        ranks = self.ranks
+        self.gpu_world_size, self.gpu_global_rank = ranks.world_size, ranks.rank
+        self.gpu_local_rank = ranks.local_rank
+        # Told otherwise, `learn` would do what `_agree` does, with a line on every rank's console.
+        self.is_distributed = False
+        sizes = {"global_rank": ranks.rank, "local_rank": ranks.local_rank}
+        self.cfg["multi_gpu"] = sizes | {"world_size": ranks.world_size} if ranks.several else None
+
+    def _agree(self) -> None:
+        """Give all ranks the first one's networks, and estimate anew with them."""
+        if self.ranks.several:
+            self.alg.broadcast_parameters()
+            self.env.refresh()
+
+    def _own_state(self) -> dict[str, Any]:
+        """Return what differs between ranks."""
+        return {
+            "env": self.env.state_dict(),
+            "logger": self.logger.state_dict(),
+            "torch_random_state": torch.get_rng_state(),
+            "cuda_random_state": torch.cuda.get_rng_state(self.device) if self._on_cuda else None,
+        }
+
+    def _load_own_state(self, state: dict[str, Any]) -> None:
+        self.env.load_state_dict(state["env"])
+        self.logger.load_state_dict(state["logger"])
+        torch.set_rng_state(state["torch_random_state"])
+        # A run that moves to a GPU has no state to go on from there.
+        if self._on_cuda and state["cuda_random_state"] is not None:
+            torch.cuda.set_rng_state(state["cuda_random_state"], self.device)
+
+    @contextlib.contextmanager
+    def _catch_interrupt(self) -> Iterator[None]:
+        """Turn the first SIGINT or SIGTERM into a request heeded at the end of the iteration.
+
+        With several ranks a second one says no more: torchrun passes on what a rank may have had
+        already, and ends by force what does not end by itself. It also signals the ranks that are
+        left when one is gone, which shall not keep them from saying so: there, requests are taken
+        to the end of the process.
+        """
+
+        def request(signum: int, frame: FrameType | None) -> None:
+            if self._stop_requested and not self.ranks.several:
+                raise KeyboardInterrupt
+            self._stop_requested = True
+
+        signals = (signal.SIGINT, signal.SIGTERM)
+        previous = {number: signal.signal(number, request) for number in signals}
+        try:
+            yield
+        finally:
+            if not self.ranks.several:
+                for number, handler in previous.items():
+                    signal.signal(number, handler)
+
+
+def _own_share(cfg: QuadrupedEnvCfg, ranks: Ranks) -> QuadrupedEnvCfg:
+    """Return a rank's world: its own draws, and its share of the cores where none are given."""
+    if not ranks.several:
+        return cfg
+    threads = cfg.num_threads or core_share()
+    return dataclasses.replace(cfg, seed=ranks.seed(cfg.seed), num_threads=threads)
+
+
+def _part_of_rank(checkpoint: dict[str, Any], ranks: Ranks) -> dict[str, Any] | None:
+    """Return what a rank saved of its own; None if those who saved were more or fewer."""
+    first = checkpoint | {"estimator_past": checkpoint["estimator_trainer"]["past"]}
+    parts = [first, *checkpoint.get("other_ranks", [])]
+    return parts[ranks.rank] if len(parts) == ranks.world_size else None
+
+
+class _StopTraining(Exception):  # noqa: N818
+    """Leaves rsl_rl's loop between two iterations."""

@@ -1,0 +1,118 @@
+"""The mirror image of what the networks see and say: left becomes right.
+
+The robot's two sides are nearly alike (centres of mass lie millimetres off), and so are the
+commands: a network that knows that learns from one turn what the other takes. Its mean action
+cannot choose a side where nothing that it sees does; the robot's bias and its past do that.
+"""
+
+from __future__ import annotations
+
+import torch
+
+from mute.envs.observations import OBSERVATION_WIDTHS
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.scene import LEGS
+from mute.learning.storage import PreparedModel
+from mute.networks.estimator import Estimator
+from mute.networks.reflection import Reflection
+
+__all__ = [
+    "FEET",
+    "JOINTS",
+    "OBSERVATION",
+    "POLAR",
+    "groups",
+    "heights",
+    "tie_actor_critic",
+    "tie_estimator",
+]
+
+
+def _each_leg(*sign: float) -> Reflection:
+    """Return the reflection of what every leg has, with the signs of one leg's entries."""
+    width, other_side = len(sign), {"R": "L", "L": "R"}
+    mirrored = [LEGS.index(end + other_side[side]) for end, side in LEGS]
+    index = tuple(width * leg + part for leg in mirrored for part in range(width))
+    return Reflection(index, sign * len(LEGS))
+
+
+FEET = _each_leg(1.0)
+"""Of what every foot has. Width: 4."""
+JOINTS = _each_leg(-1.0, 1.0, 1.0)
+"""Of what every joint has: hips turn about the x axis, thighs and calves about y. Width: 12."""
+POLAR = Reflection((0, 1, 2), (1.0, -1.0, 1.0))
+"""Of a velocity or a direction in the body frame, whose y axis points to the left."""
+AXIAL = Reflection((0, 1, 2), (-1.0, 1.0, -1.0))
+"""Of an angular velocity in the body frame."""
+
+_PARTS = {
+    "base_ang_vel": AXIAL,
+    "base_lin_vel": POLAR,
+    "projected_gravity": POLAR,
+    "joint_pos": JOINTS,
+    "joint_vel": JOINTS,
+    "last_action": JOINTS,
+    "command": Reflection((0, 1, 2, 3), (1.0, -1.0, -1.0, 1.0)),
+    "contact": FEET,
+    "phase": FEET,
+    # Friction, added mass, offset of the centre of mass.
+    "physics": Reflection.joined([Reflection.unchanged(2), POLAR]),
+}
+
+OBSERVATION = Reflection.joined([_PARTS[name] for name in OBSERVATION_WIDTHS])
+"""Of the policy's observation. Width: 46."""
+
+
+def heights(grid: torch.Tensor) -> Reflection:
+    """Return the reflection of heights on a grid that lies alike on both sides.
+
+    Args:
+        grid: Points in the heading frame, m. Shape: (num_heights, 2).
+    """
+    mirrored = grid * grid.new_tensor((1.0, -1.0))
+    # Not `cdist`, which may multiply in bfloat16 where a run allows that.
+    distances = (mirrored[:, None] - grid).abs().sum(dim=2)
+    return Reflection(tuple(distances.argmin(dim=1).tolist()), (1.0,) * len(grid))
+
+
+def groups(env: QuadrupedEnv, latent_dim: int, with_phase: bool) -> dict[str, Reflection]:
+    """Return the reflection of each observation group that actor and critic see.
+
+    Args:
+        env: The environment, whose groups these are.
+        latent_dim: Width of the estimator's latent.
+        with_phase: Whether the group `estimate` holds the phase.
+    """
+    parts = _PARTS | {"heights": heights(env.grid)}
+    estimate = [POLAR, parts["heights"], Reflection.swapped(latent_dim)]
+    return {
+        "policy": OBSERVATION,
+        "privileged": Reflection.joined([parts[name] for name in env.privileged_slices]),
+        "estimate": Reflection.joined([*estimate, FEET] if with_phase else estimate),
+    }
+
+
+def tie_estimator(env: QuadrupedEnv, estimator: Estimator) -> None:
+    """Make the estimator of an environment treat left and right alike, now and as it learns.
+
+    Raises:
+        ValueError: If the width of a layer is odd.
+    """
+    estimator.tie(OBSERVATION, POLAR, heights(env.grid), FEET)
+
+
+def tie_actor_critic(
+    actor: PreparedModel, critic: PreparedModel, by_group: dict[str, Reflection]
+) -> None:
+    """Make actor and critic treat left and right alike, now and as they learn.
+
+    Args:
+        actor: The actor.
+        critic: The critic.
+        by_group: Reflection of each group that they see, from `groups`.
+
+    Raises:
+        ValueError: If the width of a layer is odd.
+    """
+    for model, target in ((actor, JOINTS), (critic, Reflection.unchanged(1))):
+        model.tie(Reflection.joined([by_group[name] for name in model.obs_groups]), target)

@@ -1,0 +1,94 @@
+"""A window to watch and steer a walk in, at the speed of real time.
+
+The window is MuJoCo's own viewer. Whether one can open is `backend`'s to tell, what its keys do is
+`keys`'.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import mujoco
+import mujoco.viewer
+
+from mute.evaluation.session import Session
+from mute.live.keys import press
+from mute.support.errors import MuteError
+
+__all__ = ["watch"]
+
+_MAX_LAG = 0.1
+"""Lag behind real time from which on it is given up to catch up, s."""
+
+_CLOSING_TIME = 5.0
+"""Longest time that a window may take to close, s."""
+
+
+def watch(session: Session, num_steps: int | None, captions: Callable[[], dict[str, str]]) -> None:
+    """Walk in a window until it is closed or the time is over.
+
+    Args:
+        session: The walk; robot 0 is shown.
+        num_steps: Control steps to walk; None for as long as the window is open.
+        captions: Gives the figures to show in the window, by name; asked once a second.
+
+    Raises:
+        MuteError: If this Python cannot open windows (on macOS, that is mjpython's alone).
+    """
+    env, keys = session.env, queue.SimpleQueue[int]()
+    data = mujoco.MjData(env.model)
+    data.qpos[:] = env.simulation.qpos[0].numpy()
+    per_second = round(1.0 / env.step_dt)
+    due = time.perf_counter()
+    with _open(env.model, data, keys.put) as viewer:
+        viewer.cam.type = mujoco.mjtCamera.mjCAMERA_TRACKING
+        viewer.cam.trackbodyid = env.model.body("trunk").id
+        viewer.cam.azimuth, viewer.cam.elevation, viewer.cam.distance = 125.0, -14.0, 1.5
+        while viewer.is_running() and (num_steps is None or session.steps < num_steps):
+            while not keys.empty():
+                press(session, keys.get())
+            session.step()
+            with viewer.lock():
+                data.qpos[:] = env.simulation.qpos[0].numpy()
+                mujoco.mj_forward(env.model, data)
+            if session.steps % per_second == 0:
+                shown = captions()
+                viewer.set_texts((None, None, "\n".join(shown), "\n".join(shown.values())))
+            viewer.sync()
+            due = _wait(due + env.step_dt)
+
+
+@contextlib.contextmanager
+def _open(
+    model: mujoco.MjModel, data: mujoco.MjData, on_key: Callable[[int], None]
+) -> Iterator[Any]:
+    """Yield an open window, and leave nothing of it behind."""
+    others = set(threading.enumerate())
+    try:
+        viewer = mujoco.viewer.launch_passive(
+            model, data, key_callback=on_key, show_left_ui=False, show_right_ui=False
+        )
+    except RuntimeError as error:
+        raise MuteError(f"no window: {error}") from error
+    threads = set(threading.enumerate()) - others
+    try:
+        yield viewer
+    finally:
+        viewer.close()
+        # The thread that draws still cleans up; the process must not end under it.
+        for thread in threads:
+            thread.join(_CLOSING_TIME)
+
+
+def _wait(due: float) -> float:
+    """Sleep until a time and return it, or the present where it is too far in the past."""
+    now = time.perf_counter()
+    if now < due:
+        time.sleep(due - now)
+        return due
+    return due if now - due < _MAX_LAG else now

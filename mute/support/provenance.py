@@ -1,0 +1,56 @@
+"""Where a figure or a policy comes from: the commit, the files that went in, and the machine."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from pathlib import Path
+
+import git
+import torch
+
+from mute.support.errors import MuteError
+from mute.support.threads import usable_cores
+
+__all__ = ["REPOSITORY", "current_commit", "file_sha256", "machine_kind"]
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+"""Top of the checkout; of an installed package, the directory that it is in."""
+
+
+def current_commit() -> str:
+    """Return the commit of the working tree, with '-dirty' if it differs; 'unknown' outside git.
+
+    Files in `docs`, where results are written one after the other, may differ: no result depends on
+    them.
+    """
+    try:
+        repository = git.Repo(REPOSITORY)
+        suffix = "-dirty" if repository.is_dirty(path=":(exclude)docs") else ""
+        return f"{repository.head.commit.hexsha}{suffix}"
+    except (git.GitError, ValueError):
+        return "unknown"
+
+
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of a file, in hexadecimal.
+
+    Raises:
+        MuteError: If it cannot be read.
+    """
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise MuteError(f"cannot read {path}: {error.strerror}") from error
+
+
+def machine_kind() -> str:
+    """Return the processor, its cores that may be used and, where there is one, the GPU."""
+    processor = platform.processor() or platform.machine()
+    cpu_info = Path("/proc/cpuinfo")
+    if cpu_info.exists():
+        lines = cpu_info.read_text().splitlines()
+        names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+        processor = names[0] if names else processor
+    kind = f"{processor}, {usable_cores()} cores"
+    return f"{kind}, {torch.cuda.get_device_name()}" if torch.cuda.is_available() else kind

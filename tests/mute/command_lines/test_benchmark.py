@@ -1,0 +1,153 @@
+"""Tests of the benchmark and of the files of a release."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import venv
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from mjbatch import Batch
+from plain_go1 import PlainGo1
+
+from mute.command_lines import benchmark
+from mute.command_lines.benchmark_peers import PeerRate, peer_names, time_peer
+from mute.envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
+from mute.envs.scene import STAND_JOINT_POS, build_scene
+from mute.support import provenance
+from mute.support.errors import MuteError
+from mute.tasks import DEFAULT_TASK, make_task
+
+
+def _time(name: str, python: Path) -> PeerRate:
+    return time_peer(name, python, num_envs=4, rounds=1, task=DEFAULT_TASK)
+
+
+def test_the_benchmark_prints_the_rates_of_every_part_as_json(capsys):
+    peers = ["--peers", "gymnasium,mjlab", "--mjlab-python", "/nowhere/python"]
+    assert benchmark.main(["--num-envs", "4", "--rollouts", "1", "--json", *peers]) == 0
+    content = json.loads(capsys.readouterr().out)
+    (rates,) = content["rates"]
+    assert (rates["num_envs"], rates["rollouts"]) == (4, 1)
+    names = ("engine", "nominal_engine", "environment", "collection", "learning", "loop")
+    parts = [rates[name] for name in names]
+    assert all(rate > 0.0 for rate in parts)
+    # The loop is collection and learning, one after the other.
+    assert 1.0 / rates["loop"] == pytest.approx(1.0 / rates["collection"] + 1.0 / rates["learning"])
+    for name in ("environment", "collection", "learning", "loop"):
+        assert rates[f"{name}_over_engine"] == pytest.approx(rates[name] / rates["engine"])
+    assert rates["peak_memory_mb"] > 100.0
+    gymnasium, mjlab = content["peers"]
+    assert (gymnasium["name"], mjlab["name"]) == ("gymnasium", "mjlab")
+    assert gymnasium["version"].startswith("1.")
+    assert gymnasium["num_envs"] % 4 == 0
+    assert gymnasium["steps_per_second"] > 0.0
+    assert mjlab == {
+        "name": "mjlab",
+        "version": None,
+        "num_envs": None,
+        "steps_per_second": None,
+        "note": "/nowhere/python does not start: No such file or directory",
+    }
+
+
+def test_engine_and_environment_do_again_what_the_training_did():
+    task = make_task(DEFAULT_TASK)
+    cfg = dataclasses.replace(task.env, num_envs=3)
+    env = QuadrupedEnv(cfg)
+    replay = benchmark._Replay(env)
+    generator = torch.Generator().manual_seed(0)
+    actions = 0.5 * torch.randn(20, 3, NUM_ACTIONS, generator=generator)
+    actions[3, 0, :2] = torch.tensor([math.nan, 50.0])  # what the environment clips
+    for _ in range(2):  # the second one starts where the first one ended
+        before = env.state_dict()
+        for action in actions:
+            # Resets are the environment's alone.
+            assert not env.step(action)[2].any()
+        replay.load(before, actions)
+        replay.engine()
+        replay.environment()
+        assert torch.equal(replay._env.simulation.qpos, env.simulation.qpos)
+        qpos = torch.from_numpy(replay._physics.batch.bind("qpos")).float()
+        torch.testing.assert_close(qpos, env.simulation.qpos, atol=1e-4, rtol=1e-4)
+    friction = env.simulation.field("geom_friction").numpy()
+    assert (replay._physics.batch.expand("geom_friction") == friction).all()
+    assert friction.std() > 0.0
+
+
+def test_a_part_is_compared_with_the_engine_turn_by_turn():
+    # Turns say 1/2, 1/6 and 1/2; the medians of the times, 1 and 6, would say 1/6.
+    assert benchmark._median_ratio([1.0, 1.0, 3.0], [2.0, 6.0, 6.0]) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        (["--num-envs", "0"], "--num-envs"),
+        (["--rollouts", "0"], "--rollouts"),
+        (["--task", "fly"], "--task"),
+        (["--peers", "isaac"], "--peers"),
+        (["--peers", "mjlab,mjlab"], "--peers"),
+    ],
+)
+def test_the_benchmark_refuses_bad_input_by_name(arguments, names):
+    with pytest.raises(MuteError, match=names):
+        benchmark.main(arguments)
+
+
+def test_all_stands_for_every_peer_and_nothing_for_none():
+    assert peer_names(("all",)) == ("gymnasium", "mjlab", "mujoco_playground")
+    assert peer_names(()) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "package"), [("mjlab", "mjlab"), ("mujoco_playground", "playground")]
+)
+def test_a_peer_whose_package_is_missing_says_so(tmp_path, name, package):
+    venv.create(tmp_path, symlinks=True)
+    python = tmp_path / "bin" / "python"
+    peer = _time(name, python)
+    assert peer.note == f"{package} is not installed for {python}"
+    assert (peer.version, peer.num_envs, peer.steps_per_second) == (None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("script", "note"),
+    [
+        ("echo broken >&2; exit 3", "failed with status 3: broken"),
+        ("exit 3", "failed with status 3: no message"),
+        ("true", "printed no rate"),
+        ("echo hello", "printed no rate"),
+        ("""echo '{"speed": 3}'""", "printed no rate"),
+    ],
+)
+def test_a_peer_that_breaks_says_so(tmp_path, script, note):
+    python = tmp_path / "python"
+    python.write_text(f"#!/bin/sh\n{script}\n")
+    python.chmod(0o755)
+    assert _time("mjlab", python).note.endswith(note)
+
+
+def test_the_robots_of_gymnasium_move_as_those_of_the_engine():
+    cfg = make_task(DEFAULT_TASK).env
+    model = build_scene(cfg.scene, foot_samples=cfg.decimation)
+    batch = Batch(model, 1)
+    ctrl, qpos = batch.bind("ctrl"), batch.bind("qpos")
+    batch.reset(keyframe=model.key("stand").id)
+    robot = PlainGo1(cfg)
+    start, _ = robot.reset(seed=0)
+    observation = start
+    for action in 0.1 * np.random.default_rng(0).standard_normal((20, NUM_ACTIONS)):
+        ctrl[:] = np.add(STAND_JOINT_POS, action)
+        batch.step(nstep=cfg.decimation)
+        observation, *_ = robot.step(action)
+    np.testing.assert_allclose(observation[: model.nq], qpos[0], atol=1e-9)
+    assert np.abs(observation - start).max() > 0.05
+
+
+def test_the_machine_is_told_with_its_cores():
+    assert "cores" in provenance.machine_kind()

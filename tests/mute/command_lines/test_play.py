@@ -1,0 +1,294 @@
+"""`play.py` walks, prints figures or one JSON object, and tells bad input in one line."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import torch
+from places import REPOSITORY
+from tensordict import TensorDict
+
+from mute.acoustics.files.wav import read_wav
+from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
+from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
+from mute.checkpoint import save_checkpoint
+from mute.command_lines.play import PlayArgs, main
+from mute.command_lines.play_figures import captions, report
+from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
+from mute.controllers.command import Command
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.evaluation.session import Session
+from mute.evaluation.trials import evaluation_cfg
+from mute.learning.runner import MuteRunner, policy_part
+from mute.networks.estimator import EstimatorCfg
+from mute.support.errors import MuteError
+
+REPORTED = {
+    "beta", "command", "num_envs", "seconds", "speed", "velocity_error_sq", "landing_speed_mean",
+    "landing_speed_rms", "apex_mean", "duty_factor", "stride_frequency", "power", "fall_rate",
+}  # fmt: skip
+HEADLESS = {
+    key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")
+} | {"OMP_NUM_THREADS": "1"}
+
+
+class _Stand:
+    """Holds the stance, and remembers what it was asked to forget."""
+
+    def __init__(self, num_envs: int) -> None:
+        self.num_envs = num_envs
+        self.resets: list[torch.Tensor | None] = []
+
+    def reset(self, mask: torch.Tensor | None = None) -> None:
+        self.resets.append(mask)
+
+    def act(self, observations: TensorDict) -> torch.Tensor:
+        return torch.zeros(self.num_envs, 12)
+
+
+def _make_session(num_envs: int = 2) -> Session:
+    cfg = evaluation_cfg(QuadrupedEnvCfg(num_threads=1), num_envs, seconds=10.0, seed=0)
+    return Session(QuadrupedEnv(cfg), _Stand(num_envs), Command(0.5, 0.0, 0.0, 0.5), 0.1)
+
+
+def _play(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "play.py", *words],
+        cwd=REPOSITORY,
+        env=HEADLESS,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def policy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write a small policy with random weights."""
+    estimation = EstimationCfg(network=EstimatorCfg(lstm_hidden=8, latent_dim=4, phase_hidden=(8,)))
+    agent = AgentCfg(actor_hidden=(8,), critic_hidden=(8,), estimation=estimation)
+    cfg = TaskCfg(QuadrupedEnvCfg(num_envs=4, num_threads=1), agent)
+    runner = MuteRunner("go1_mute", cfg, None)
+    path = tmp_path_factory.mktemp("policy") / "random.pt"
+    payload = {"task": "go1_mute", "config": to_plain(cfg), "iter": 0}
+    save_checkpoint(path, policy_part(runner.alg.save() | payload))
+    return path
+
+
+@pytest.fixture(scope="module")
+def heard(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Path]:
+    """Return what a second of the shipped policy on tile prints, and its sound."""
+    path = tmp_path_factory.mktemp("sound") / "new" / "tile.wav"
+    words = ("--beta", "0", "--surface", "tile", "--wav", str(path), "--seconds", "1", "--json")
+    run = _play(*words)
+    assert run.returncode == 0, run.stderr
+    return json.loads(run.stdout), path
+
+
+# -- the command line, really run ----------------------------------------------------------------
+
+
+def test_json_prints_one_object_on_standard_output_and_nothing_else(policy):
+    words = ("--beta", "0.7", "--vx", "-0.3", "--num-envs", "2", "--seconds", "1", "--json")
+    run = _play("--policy", str(policy), *words)
+    assert run.returncode == 0, run.stderr
+    printed = json.loads(run.stdout)
+    assert set(printed) == REPORTED
+    assert (printed["beta"], printed["command"]) == (0.7, [-0.3, 0.0, 0.0])
+    assert (printed["num_envs"], printed["seconds"]) == (2, 1.0)
+    assert isinstance(printed["speed"], float)
+    assert 0.0 <= printed["duty_factor"] <= 1.0
+
+
+def test_without_a_display_each_second_is_a_line_and_a_summary_ends_it(policy):
+    run = _play("--policy", str(policy), "--seconds", "2")
+    assert run.returncode == 0, run.stderr
+    seconds = [line for line in run.stdout.splitlines() if line.startswith(("  1.0 s", "  2.0 s"))]
+    assert len(seconds) == 2
+    for figure in ("speed", "tracking error", "landing speed", "strides"):
+        assert all(figure in line for line in seconds)
+    assert all(re.search(r"level \d\d\.\d dBA", line) for line in seconds)
+    assert "over 2.0 s, 1 robot:" in run.stdout.splitlines()
+    # The floor is training's: wood is but what it is heard as.
+    assert re.search(r"MNL +\d\d\.\d dBA \(modelled, sounding as wood\)", run.stdout)
+
+
+def test_a_level_is_said_to_be_of_the_floor_walked_on_and_of_the_first_of_several_robots(policy):
+    run = _play("--policy", str(policy), "--seconds", "2", "--surface", "tile", "--num-envs", "2")
+    assert run.returncode == 0, run.stderr
+    assert "sounding as" not in run.stdout
+    assert re.search(r"MNL +\d\d\.\d dBA \(modelled, on tile, first robot\)", run.stdout)
+    assert re.search(r"level \d\d\.\d dBA \(first robot\)", run.stdout)
+
+
+def test_a_surface_adds_its_name_and_levels_above_the_fans_to_the_object(heard):
+    printed, _ = heard
+    assert set(printed) == REPORTED | {"surface", "mnl", "pnl", "laeq"}
+    assert printed["surface"] == "tile"
+    assert 55.0 < printed["mnl"] <= printed["pnl"] < 100.0
+    assert 55.0 < printed["laeq"] < 100.0
+
+
+def test_the_wav_file_has_the_whole_walk_and_is_louder_than_the_fan(heard):
+    samples, rate = read_wav(heard[1])
+    assert (rate, samples.shape) == (SAMPLE_RATE, (1, SAMPLE_RATE))
+    meter = SoundLevelMeter(rate)
+    meter.update(samples * WAV_FULL_SCALE)
+    assert 58.0 < meter.result()[0].laeq < 100.0  # the fan alone: 55
+
+
+def test_a_bad_beta_is_one_line_and_status_2():
+    run = _play("--beta", "1.2")
+    assert run.returncode == 2
+    assert run.stderr == "error: --beta must be at least 0 and at most 1, got 1.2\n"
+    assert run.stdout == ""
+
+
+# -- bad input -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--beta", "-0.1"), "--beta must be at least 0 and at most 1, got -0.1"),
+        (("--beta", "nan"), "--beta must be .* got nan"),
+        (("--vx", "2.5"), "--vx must be at least -2 and at most 2, got 2.5"),
+        (("--wz", "inf"), "--wz must be .* got inf"),
+        (("--seconds", "0"), "--seconds must be above 0 .* got 0"),
+        (("--num-envs", "-3"), "--num-envs must be at least 1 .* got -3"),
+        (("--seed", "-1"), "--seed must be at least 0 .* got -1"),
+        (("--task", "go2"), "--task must be one of go1_mute, .* got 'go2'"),
+        (("--surface", "ice"), "--surface must be one of wood, carpet, .* got 'ice'"),
+        (("--wav", "walk.mp3"), "--wav must name a .wav file, got 'walk.mp3'"),
+        (("--sources", "fan,voice"), "--sources must be of impacts, scuffing, drive, fan"),
+        (("--microphone", "0,1,-1"), "--microphone must be within 100 m and not below the ground"),
+        (("--video", "walk.avi"), "--video must name an .mp4 file, got 'walk.avi'"),
+        (("--video", "walk.mp4", "--viewer", "native"), "not with --viewer native"),
+        (("--beta", "soft"), "--beta.*'soft'; see --help"),
+        (("--bta", "1"), "Unrecognized options: --bta"),
+        (("--viewer", "web"), "invalid choice 'web' for argument '--viewer'"),
+    ],
+)
+def test_a_bad_argument_is_told_with_its_name_and_value(words, message, capsys):
+    with pytest.raises(MuteError, match=message):
+        main(["--viewer", "none", *words] if "--viewer" not in words else words)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_missing_policy_is_told_by_its_path(tmp_path):
+    with pytest.raises(MuteError, match=r"nothing\.pt"):
+        main(["--viewer", "none", "--policy", str(tmp_path / "nothing.pt")])
+
+
+def test_a_task_without_a_shipped_policy_says_how_to_learn_one(monkeypatch, tmp_path):
+    monkeypatch.setattr("mute.command_lines.play.RESOURCES", tmp_path)
+    with pytest.raises(MuteError, match=r"train\.py --task go1_mute_paper"):
+        main(["--viewer", "none", "--task", "go1_mute_paper"])
+
+
+def test_a_file_of_another_program_is_refused(tmp_path):
+    path = tmp_path / "foreign.pt"
+    torch.save({"weights": torch.zeros(3)}, path)
+    with pytest.raises(MuteError, match="written by another program"):
+        main(["--viewer", "none", "--policy", str(path)])
+
+
+def test_a_policy_of_another_task_than_asked_for_is_refused(policy):
+    with pytest.raises(MuteError, match="is of task 'go1_mute', not 'go1_mute_paper'"):
+        main(["--viewer", "none", "--policy", str(policy), "--task", "go1_mute_paper"])
+
+
+def test_a_window_without_a_display_is_refused(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(MuteError, match="--viewer native: there is no display"):
+        main(["--viewer", "native"])
+
+
+def test_a_sound_that_cannot_be_written_is_told_by_its_path(policy, tmp_path):
+    path = tmp_path / "folder.wav"
+    path.mkdir()
+    with pytest.raises(MuteError, match=r"cannot write .*folder\.wav"):
+        main(["--viewer", "none", "--policy", str(policy), "--wav", str(path), "--json"])
+
+
+def test_a_walk_stopped_at_once_leaves_no_sound_and_says_so(policy, tmp_path, monkeypatch, capsys):
+    def stop(session):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Session, "step", stop)
+    path = tmp_path / "walk.wav"
+    words = ["--viewer", "none", "--policy", str(policy), "--wav", str(path), "--json"]
+    assert main(words) == 130
+    assert f"{path} is not written: the walk ended before its sound began\n" in (
+        capsys.readouterr().err
+    )
+    assert not path.exists()
+
+
+# -- what is walked and what is reported ---------------------------------------------------------
+
+
+def test_every_command_within_the_limits_passes_the_check():
+    args = PlayArgs(beta=1.0, vx=-2.0, vy=1.0, wz=2.0, seconds=0.02, num_envs=1)
+    args.check()
+    with pytest.raises(MuteError, match="--vx must be"):
+        dataclasses.replace(args, vx=-2.01).check()
+
+
+def test_a_new_command_is_observed_and_measured_from_the_next_step_on():
+    session = _make_session()
+    for _ in range(50):
+        session.step()
+    session.recent_gait()
+    session.set_command(Command(2.0, 0.0, 0.0, 0.25))
+    assert session.env.get_observations()["policy"][0, -1] == pytest.approx(0.25)
+    for _ in range(10):
+        session.step()
+    # A robot that stands makes the error of the whole command.
+    assert session.recent_gait().velocity_error_sq == pytest.approx(4.0, abs=0.3)
+
+
+def test_a_robot_that_falls_goes_on_with_the_same_command_and_no_past():
+    session = _make_session()
+    session.set_command(Command(0.3, 0.1, -0.2, 0.9))
+    session.env.simulation.qpos[1, 3:7] = torch.tensor((0.0, 1.0, 0.0, 0.0))  # on its back
+    session.step()
+    expected = torch.tensor((0.3, 0.1, -0.2, 0.9))
+    torch.testing.assert_close(session.env.commands.command, expected.expand(2, 4))
+    controller = session.controller
+    assert isinstance(controller, _Stand)
+    forgotten = controller.resets[-1]
+    assert forgotten is not None
+    assert forgotten.tolist() == [False, True]
+    assert session.gait().fall_rate == 0.5
+
+
+def test_a_restart_forgets_figures_and_time_but_not_the_command():
+    session = _make_session()
+    session.set_command(Command(0.1, 0.2, 0.3, 0.4))
+    session.env.simulation.qpos[0, 3:7] = torch.tensor((0.0, 1.0, 0.0, 0.0))
+    session.step()
+    session.restart()
+    assert session.seconds == 0.0
+    assert session.gait().fall_rate == 0.0
+    expected = torch.tensor((0.1, 0.2, 0.3, 0.4))
+    torch.testing.assert_close(session.env.commands.command[0], expected)
+
+
+def test_what_was_not_measured_is_null_in_the_report_and_a_dash_on_the_screen():
+    session = _make_session()
+    printed = json.loads(json.dumps(report(session), allow_nan=False))
+    assert printed["landing_speed_mean"] is None
+    assert printed["speed"] is None
+    assert printed["fall_rate"] == 0.0
+    assert captions(session.gait())["landing speed"] == "-"

@@ -1,0 +1,94 @@
+"""Tests of the files of a release and of the card that is printed from them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+from learning_helpers import make_runner
+from places import REPOSITORY
+
+from mute.command_lines import card, evaluate, release
+from mute.evaluation.tables import read_json, write_json
+from mute.support.errors import MuteError
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    """A finished run of two iterations, and figures that need no walking."""
+    run_dir = tmp_path / "run"
+    runner = make_runner(run_dir)
+    runner.train()
+    parameters = {
+        "command": "python train.py --task go1_mute --log-dir /somewhere --seed 3",
+        "resumed": [{"command": "python train.py --resume /somewhere/run/model_0.pt"}],
+        "commit": "c" * 40,
+        "machine": "a machine",
+    }
+    (run_dir / "config.yaml").write_text(yaml.safe_dump(parameters))
+
+    def measure(argv):
+        write_json(Path(argv[-1]) / "gait.json", {"policy": argv[2]})
+        return 0
+
+    monkeypatch.setattr(evaluate, "main", measure)
+    return run_dir
+
+
+def test_a_release_holds_policy_onnx_and_a_card_of_where_they_come_from(run, tmp_path):
+    out = tmp_path / "out"
+    assert release.main(["--checkpoint", str(run / "model_1.pt"), "--out", str(out)]) == 0
+    assert sorted(path.name for path in out.iterdir()) == [
+        "go1_mute.json",
+        "go1_mute.onnx",
+        "go1_mute.pt",
+    ]
+    told = read_json(out / "go1_mute.json")
+    assert told["command"] == "python train.py --task go1_mute --seed 3"
+    assert told["resumed"] == ["python train.py --resume model_0.pt"]
+    assert (told["seed"], told["iterations"], told["steps"]) == (3, 2, 2 * 8 * 8)
+    assert (told["commit"], told["machine"]) == ("c" * 40, "a machine")
+    assert told["figures"] == {"policy": str(out / "go1_mute.pt")}
+
+
+def test_a_policy_alone_cannot_be_released(run, tmp_path):
+    release.main(["--checkpoint", str(run / "model_1.pt"), "--out", str(tmp_path)])
+    with pytest.raises(MuteError, match="policy only"):
+        release.main(["--checkpoint", str(tmp_path / "go1_mute.pt"), "--out", str(tmp_path)])
+
+
+def test_a_checkpoint_outside_its_run_cannot_be_released(run, tmp_path):
+    (run / "config.yaml").unlink()
+    with pytest.raises(MuteError, match="outside its run"):
+        release.main(["--checkpoint", str(run / "model_1.pt"), "--out", str(tmp_path)])
+
+
+def test_markdown_formats_each_column_and_leaves_a_dash_for_what_is_missing():
+    columns = {"beta": ("beta", "{:g}"), "fall_rate": ("falls", "{:.1%}")}
+    rows = [{"beta": 0.5, "fall_rate": 0.25}, {"beta": 1.0, "fall_rate": None}]
+    assert card.markdown(rows, columns).splitlines() == [
+        "| beta | falls |",
+        "| --- | --- |",
+        "| 0.5 | 25.0% |",
+        "| 1 | - |",
+    ]
+
+
+def test_a_card_that_is_missing_is_named(tmp_path):
+    with pytest.raises(MuteError, match="nowhere"):
+        card.main(["--card", str(tmp_path / "nowhere.json")])
+
+
+def test_the_readmes_tables_are_those_that_the_card_prints(capsys):
+    assert card.main([]) == 0
+    readme = (REPOSITORY / "README.md").read_text()
+    lines = [line for line in capsys.readouterr().out.splitlines() if line]
+    assert len(lines) > 40
+    assert [line for line in lines if line not in readme] == []
+
+
+def test_a_released_policy_is_small(run, tmp_path):
+    release.main(["--checkpoint", str(run / "model_1.pt"), "--out", str(tmp_path)])
+    full, small = run / "model_1.pt", tmp_path / "go1_mute.pt"
+    assert small.stat().st_size < full.stat().st_size

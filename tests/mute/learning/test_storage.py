@@ -1,0 +1,99 @@
+"""The networks that rsl_rl's PPO learns are rsl_rl's, whatever they save on the way."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from rsl_rl.models import MLPModel
+from tensordict import TensorDict
+
+from mute.learning.storage import PreparedModel
+from mute.networks.elu import ELU
+from mute.networks.reflection import Reflection
+
+
+@pytest.mark.parametrize("activation", ["elu", "relu", "selu", "tanh"])
+def test_fast_activations_change_neither_outputs_nor_gradients(activation):
+    generator = torch.Generator().manual_seed(0)
+    obs = TensorDict(
+        {name: torch.randn(64, 5, generator=generator) for name in ("policy", "estimate")}, 64
+    )
+    groups = {"actor": ["policy", "estimate"]}
+    sizes = {"output_dim": 3, "hidden_dims": (16, 8), "activation": activation}
+    plain = MLPModel(obs, groups, "actor", **sizes)
+    ours = PreparedModel(obs, groups, "actor", **sizes)
+    ours.load_state_dict(plain.state_dict())
+    # PPO hands over inputs ready made, and the same ones in every pass.
+    obs[ours.prepared_group] = torch.cat((obs["policy"], obs["estimate"]), dim=-1)
+    before = obs.clone()
+    outputs = [model(obs) for model in (plain, ours)]
+    torch.testing.assert_close(*outputs, rtol=0.0, atol=0.0 if activation != "elu" else 1e-6)
+    for output in outputs:
+        output.square().sum().backward()
+    for expected, parameter in zip(plain.parameters(), ours.parameters(), strict=True):
+        assert parameter.grad is not None and expected.grad is not None
+        assert torch.allclose(parameter.grad, expected.grad, rtol=1e-5, atol=1e-6)
+    assert (obs == before).all()
+
+
+@pytest.mark.parametrize("activation", ["elu", "relu", "selu"])
+def test_activations_are_the_fast_ones(activation):
+    obs = TensorDict({"policy": torch.randn(4, 10)}, batch_size=4)
+    model = PreparedModel(obs, {"actor": ["policy"]}, "actor", 3, (16, 8), activation)
+    activations = [layer for layer in model.mlp if not isinstance(layer, torch.nn.Linear)]
+    assert len(activations) == 2
+    for layer in activations:
+        assert isinstance(layer, ELU) if activation == "elu" else layer.inplace
+
+
+def _make_actor(obs):
+    torch.manual_seed(0)
+    gaussian = {"class_name": "mute.learning.distribution:SharedGaussian", "init_std": 0.5}
+    settings = {"obs_normalization": True, "distribution_cfg": gaussian}
+    model = PreparedModel(obs, {"actor": ["policy"]}, "actor", 4, (16, 8), **settings)
+    model.update_normalization(obs)
+    return model
+
+
+def _make_obs():
+    torch.manual_seed(1)
+    return TensorDict({"policy": 5.0 + torch.randn(100, 10)}, batch_size=100)
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_an_update_draws_no_actions_and_sees_the_same_distribution(tied):
+    obs = _make_obs()
+    model = _make_actor(obs)
+    if tied:
+        model.tie(Reflection.swapped(10), Reflection.swapped(4))
+    drawn = model(obs, stochastic_output=True)
+    assert not torch.equal(drawn, model.output_mean)
+    prepared = TensorDict({model.prepared_group: model.get_latent(obs)}, batch_size=100)
+    before, results = torch.get_rng_state(), []
+    for observations in (obs, prepared):
+        torch.set_rng_state(before)
+        model(observations, stochastic_output=True)
+        log_prob = model.get_output_log_prob(drawn.detach())
+        gradients = torch.autograd.grad(log_prob.square().mean(), [*model.parameters()])
+        results.append((*model.output_distribution_params, log_prob, gradients))
+    assert torch.equal(torch.get_rng_state(), before)
+    torch.testing.assert_close(*results)
+
+
+def test_a_critic_without_a_distribution_gives_its_output():
+    obs = _make_obs()
+    model = PreparedModel(obs, {"critic": ["policy"]}, "critic", 1, (16, 8))
+    model.tie(Reflection.swapped(10), Reflection.unchanged(1))
+    prepared = TensorDict({model.prepared_group: model.get_latent(obs)}, batch_size=100)
+    torch.testing.assert_close(model(prepared), model(obs))
+
+
+def test_a_single_raw_group_is_not_taken_for_an_input_ready_made():
+    obs = _make_obs()
+    assert _make_actor(obs).get_latent(obs).mean().abs() < 0.1
+
+
+def test_two_models_of_the_same_groups_prepare_inputs_of_their_own():
+    obs = _make_obs()
+    models = [PreparedModel(obs, {name: ["policy"]}, name, 3, (8,)) for name in ("actor", "critic")]
+    assert models[0].prepared_group != models[1].prepared_group

@@ -1,0 +1,379 @@
+"""A walk can be filmed and steered: backends are found, videos follow the robot, keys command."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import imageio.v3 as imageio
+import imageio_ffmpeg
+import numpy as np
+import pytest
+import torch
+from places import REPOSITORY
+from tensordict import TensorDict
+
+from mute.acoustics.files.wav import read_wav, write_wav
+from mute.acoustics.listener import SAMPLE_RATE
+from mute.checkpoint import save_checkpoint
+from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
+from mute.controllers.command import Command
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.evaluation.session import Session
+from mute.learning.runner import MuteRunner, policy_part
+from mute.live.keys import press
+from mute.networks.estimator import EstimatorCfg
+from mute.rendering import backend
+from mute.rendering.sound_track import add_sound
+from mute.support.errors import MuteError
+
+UP, DOWN, LEFT, RIGHT = 265, 264, 263, 262  # GLFW's codes
+
+FILM = """
+import sys
+from pathlib import Path
+import torch
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.rendering.video import Video
+
+folder = Path(sys.argv[1])
+env = QuadrupedEnv(QuadrupedEnvCfg(num_envs=2, num_threads=1, random_heading=False))
+env.simulation.qpos[0, :2] = torch.zeros(2)
+with Video(folder / "new" / "whole.mp4", env, sound=folder / "gone.wav") as video:
+    env.simulation.qpos[0, :2] = torch.tensor((7.0, -3.0))
+    for _ in range(4):
+        video.record()
+print(video.silent_because)
+try:
+    with Video(folder / "broken.mp4", env) as video:
+        raise ValueError("broken walk")
+except ValueError:
+    print("broken walk")
+"""
+
+
+class _Stand:
+    """Holds the stance."""
+
+    num_envs = 1
+
+    def reset(self, mask: torch.Tensor | None = None) -> None:
+        pass
+
+    def act(self, observations: TensorDict) -> torch.Tensor:
+        return torch.zeros(1, 12)
+
+
+@pytest.fixture(scope="module")
+def environ() -> dict[str, str]:
+    """Return the environment variables of a process that can render off-screen."""
+    try:
+        found = backend.find_backend(os.environ)
+    except MuteError as error:
+        pytest.skip(str(error))
+    return {**os.environ, "MUJOCO_GL": found, "OMP_NUM_THREADS": "1"}
+
+
+@pytest.fixture
+def session() -> Session:
+    env = QuadrupedEnv(QuadrupedEnvCfg(num_envs=1, num_threads=1))
+    return Session(env, _Stand(), Command(0.5, 0.0, 0.0, 0.5))
+
+
+def _write_policy(path: Path) -> None:
+    estimation = EstimationCfg(network=EstimatorCfg(lstm_hidden=8, latent_dim=4, phase_hidden=(8,)))
+    agent = AgentCfg(actor_hidden=(8,), critic_hidden=(8,), estimation=estimation)
+    cfg = TaskCfg(QuadrupedEnvCfg(num_envs=4, num_threads=1), agent)
+    state = MuteRunner("go1_mute", cfg, None).alg.save()
+    state["actor_state_dict"]["mlp.2.weight"] *= 20.0  # an untrained actor hardly moves
+    save_checkpoint(
+        path, policy_part(state | {"task": "go1_mute", "config": to_plain(cfg), "iter": 0})
+    )
+
+
+@pytest.fixture(scope="module")
+def films(tmp_path_factory: pytest.TempPathFactory, environ: dict[str, str]) -> Path:
+    """Return a folder after a film of a robot that jumps away, and a walk that broke."""
+    folder = tmp_path_factory.mktemp("films")
+    run = subprocess.run(
+        [sys.executable, "-c", FILM, str(folder)],
+        cwd=REPOSITORY,
+        env=environ,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    reason, last = run.stdout.splitlines()
+    assert "No such file" in reason
+    assert last == "broken walk"
+    return folder
+
+
+def _dark_pixels(picture: np.ndarray) -> np.ndarray:
+    """Return where the robot's black parts are; floor and sky have none. Shape: (n, 2)."""
+    return np.argwhere(picture.max(axis=2) < 45)
+
+
+# -- video ---------------------------------------------------------------------------------------
+
+
+def test_the_camera_follows_the_robot(films):
+    frames = imageio.imread(films / "new" / "whole.mp4")
+    assert frames.shape[1:] == (720, 1280, 3)
+    first, last = _dark_pixels(frames[0]), _dark_pixels(frames[-1])
+    assert len(first) > 1000
+    assert not np.array_equal(frames[0], frames[-1])  # the floor has moved
+    np.testing.assert_allclose(last.mean(axis=0), first.mean(axis=0), atol=20.0)
+
+
+def test_a_film_has_its_name_when_it_is_whole_and_a_broken_one_leaves_nothing(films):
+    assert [path for path in films.rglob("*") if path.is_file()] == [films / "new" / "whole.mp4"]
+
+
+def test_play_finds_a_backend_and_a_film_that_is_interrupted_is_kept(tmp_path, environ):
+    policy, path = tmp_path / "random.pt", tmp_path / "walk.mp4"
+    _write_policy(policy)
+    words = ("--policy", str(policy), "--seconds", "600", "--video", str(path))
+    without_choice = {key: value for key, value in environ.items() if key != "MUJOCO_GL"}
+    walk = subprocess.Popen(
+        [sys.executable, "play.py", *words],
+        cwd=REPOSITORY,
+        env=without_choice,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert walk.stdout is not None
+    while (line := walk.stdout.readline()) and "  1.0 s" not in line:
+        pass
+    walk.send_signal(signal.SIGINT)
+    _, stderr = walk.communicate(timeout=120)
+    assert walk.returncode == 130, stderr
+    assert f"{path} holds what was filmed so far" in stderr
+    frames = imageio.imread(path)
+    assert len(frames) >= 25
+    assert np.abs(frames[0].astype(int) - frames[20]).max() > 100  # the robot moves
+    sound = _sound_of(path)
+    assert len(sound) > 0.5 * SAMPLE_RATE
+    assert np.abs(sound).max() > 0.0  # the fan at least
+    assert sorted(tmp_path.iterdir()) == [policy, path]
+
+
+# -- the sound of a video ------------------------------------------------------------------------
+
+
+def _sound_of(film: Path) -> np.ndarray:
+    """Return the samples of a film's sound, full scale is 1; none where it is silent."""
+    ffmpeg = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", str(film)]
+    run = subprocess.run(
+        [*ffmpeg, "-map", "0:a", "-ac", "1", "-f", "s16le", "-"], capture_output=True, check=False
+    )
+    return np.frombuffer(run.stdout, "<i2") / 32768.0
+
+
+@pytest.fixture
+def film(tmp_path: Path) -> Path:
+    """Return a silent film of half a second, as small as can be."""
+    pictures = np.linspace(0, 255, 25)[:, None, None, None] * np.ones((1, 32, 32, 3))
+    path = tmp_path / "film.mp4"
+    imageio.imwrite(path, pictures.astype(np.uint8), fps=50)
+    return path
+
+
+def test_a_film_gets_the_sound_and_keeps_its_pictures(film):
+    before = imageio.imread(film)
+    wav = film.with_name("tone.wav")
+    tone = 0.5 * np.sin(2.0 * np.pi * 1000.0 * np.arange(24000) / 48000.0)
+    write_wav(wav, tone, 48000)
+    add_sound(film, wav)
+    np.testing.assert_array_equal(imageio.imread(film), before)
+    sound = _sound_of(film)
+    assert len(sound) == pytest.approx(24000, abs=1024)  # a frame of AAC
+    assert np.sqrt(np.mean(sound[2400:21600] ** 2)) == pytest.approx(0.5 / np.sqrt(2.0), rel=0.02)
+    assert sorted(film.parent.iterdir()) == [film, wav]
+
+
+def test_a_sound_that_cannot_be_read_leaves_the_film_as_it_was(film):
+    before = film.read_bytes()
+    wav = film.with_name("broken.wav")
+    wav.write_bytes(b"no sound at all")
+    with pytest.raises(MuteError, match="Invalid data"):
+        add_sound(film, wav)
+    assert film.read_bytes() == before
+    assert sorted(film.parent.iterdir()) == [wav, film]
+
+
+def _evaluate(environ: dict[str, str], *words: str | Path) -> str:
+    """Return what `evaluate.py` prints on standard output."""
+    run = subprocess.run(
+        [sys.executable, "evaluate.py", *map(str, words)],
+        cwd=REPOSITORY,
+        env={key: value for key, value in environ.items() if key != "MUJOCO_GL"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    return run.stdout
+
+
+def test_evaluate_films_the_first_trial_of_each_setting_with_its_sound(tmp_path, environ):
+    words = ("noise", "--surface", "wood", "--beta", "0,1", "--trials", "1", "--seconds", "1.2")
+    _evaluate(environ, *words, "--video", tmp_path / "walk.mp4", "--out", tmp_path / "out")
+    paths = [tmp_path / f"walk-wood-beta{beta}.mp4" for beta in (0, 1)]
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "out", *paths]
+    levels = []
+    for path in paths:
+        rate = imageio.immeta(path)["fps"]
+        frames = imageio.imread(path)
+        # It begins when the robot has settled, and the view is from where the robot begins.
+        assert len(frames) / rate == pytest.approx(1.2, abs=1.5 / rate)
+        assert len(_dark_pixels(frames[0])) > 1000
+        sound = _sound_of(path)
+        assert len(sound) / SAMPLE_RATE == pytest.approx(1.2, abs=0.03)
+        levels.append(float(np.sqrt(np.mean(sound**2))))
+    assert levels[0] > 1.4 * levels[1] > 0.0
+
+
+def test_a_sweep_keeps_the_sound_that_it_puts_into_a_film(tmp_path, environ):
+    words = ("sweep-speed", "--speed", "0.5", "--beta", "1", "--trials", "1", "--seconds", "1.04")
+    wav, film, out = tmp_path / "walk.wav", tmp_path / "walk.mp4", tmp_path / "out"
+    shown = _evaluate(environ, *words, "--wav", wav, "--video", film, "--out", out)
+    assert f"kept: {wav}, {film}\n" in shown
+    assert sorted(tmp_path.iterdir()) == [out, film, wav]
+    kept, rate = read_wav(wav)
+    assert kept.shape[1] == round(1.04 * rate)
+    heard = _sound_of(film)[: kept.shape[1]]
+    assert np.std(heard) == pytest.approx(np.std(kept), rel=0.05)  # AAC is lossy
+
+
+def test_a_walk_over_a_course_is_filmed_with_its_sound(tmp_path, environ):
+    course, film, out = tmp_path / "course.yaml", tmp_path / "walk.mp4", tmp_path / "out"
+    course.write_text(
+        "speed: 0.5\npath: [[0, 0], [0.6, 0]]\n"
+        "floors: [{floor: tile, low: [-1, -1], high: [2, 1]}]\n"
+    )
+    shown = _evaluate(environ, "walk", "--course", course, "--video", film, "--out", out)
+    assert f"kept: {film}\n" in shown
+    assert sorted(tmp_path.iterdir()) == [course, out, film]
+    filmed = json.loads((out / "walk.json").read_text())["seconds"] - 1.0
+    rate = imageio.immeta(film)["fps"]
+    assert len(imageio.imread(film)) / rate == pytest.approx(filmed, abs=1.5 / rate)
+    sound = _sound_of(film)
+    assert len(sound) / SAMPLE_RATE == pytest.approx(filmed, abs=0.03)
+    assert np.std(sound) > 0.0
+
+
+# -- backends ------------------------------------------------------------------------------------
+
+
+def _only(*working: str):
+    return lambda code, environ: environ.get("MUJOCO_GL") in working
+
+
+def test_egl_is_tried_before_osmesa(monkeypatch):
+    monkeypatch.setattr(backend, "_succeeds", _only("egl", "osmesa"))
+    assert backend.find_backend({}) == "egl"
+    monkeypatch.setattr(backend, "_succeeds", _only("osmesa"))
+    assert backend.find_backend({}) == "osmesa"
+
+
+def test_the_users_choice_goes_first(monkeypatch):
+    monkeypatch.setattr(backend, "_succeeds", _only("egl", "osmesa"))
+    assert backend.find_backend({"MUJOCO_GL": "osmesa"}) == "osmesa"
+
+
+def test_where_nothing_renders_the_packages_to_install_are_named(monkeypatch):
+    monkeypatch.setattr(backend, "_succeeds", _only())
+    with pytest.raises(MuteError, match="apt install libegl1 libgl1-mesa-dri, or libosmesa6"):
+        backend.find_backend({})
+
+
+def test_a_choice_that_does_not_work_is_told_by_its_name():
+    with pytest.raises(MuteError, match="MUJOCO_GL=crayons does not render"):
+        backend.find_backend({**os.environ, "MUJOCO_GL": "crayons"})
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing is chosen")
+def test_only_a_video_makes_a_choice(monkeypatch):
+    monkeypatch.setattr(backend, "_succeeds", _only("osmesa"))
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    backend.configure_rendering(["--beta", "0.5"])
+    assert "MUJOCO_GL" not in os.environ
+    monkeypatch.setenv("MUJOCO_GL", "")  # restored after the test
+    backend.configure_rendering(["--video=walk.mp4"])
+    assert os.environ["MUJOCO_GL"] == "osmesa"
+
+
+@pytest.mark.parametrize(
+    ("environ", "platform", "expected"),
+    [
+        ({}, "linux", False),
+        ({"DISPLAY": ":0"}, "linux", True),
+        ({"WAYLAND_DISPLAY": "wayland-0"}, "linux", True),
+        ({}, "darwin", True),
+    ],
+)
+def test_a_display_is_known_by_its_variables(environ, platform, expected):
+    assert backend.has_display(environ, platform) is expected
+
+
+def test_a_display_that_is_named_and_gone_opens_no_window():
+    gone = {**os.environ, "DISPLAY": ":987"}
+    gone.pop("WAYLAND_DISPLAY", None)
+    assert backend.why_no_window(gone, "linux") == "no window with OpenGL opens on this display"
+
+
+def test_plain_python_on_macos_is_told_of_mjpython():
+    assert "mjpython" in (backend.why_no_window({}, "darwin") or "")
+
+
+# -- keys ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("key", "expected"),
+    [
+        (UP, Command(0.6, 0.0, 0.0, 0.5)),
+        (DOWN, Command(0.4, 0.0, 0.0, 0.5)),
+        (LEFT, Command(0.5, 0.0, 0.1, 0.5)),
+        (RIGHT, Command(0.5, 0.0, -0.1, 0.5)),
+        (ord("Q"), Command(0.5, 0.1, 0.0, 0.5)),
+        (ord("E"), Command(0.5, -0.1, 0.0, 0.5)),
+        (ord("B"), Command(0.5, 0.0, 0.0, 0.6)),
+        (ord("V"), Command(0.5, 0.0, 0.0, 0.4)),
+        (ord(" "), Command(0.0, 0.0, 0.0, 0.5)),
+        (ord("X"), Command(0.5, 0.0, 0.0, 0.5)),
+    ],
+)
+def test_a_key_changes_the_command_of_the_robots(session, key, expected):
+    press(session, key)
+    assert session.command == expected
+    torch.testing.assert_close(session.env.commands.command[0], expected.tensor())
+
+
+def test_keys_stay_within_the_limits_and_come_back_to_exactly_zero(session):
+    for _ in range(30):
+        press(session, UP)
+    assert session.command.vx == 2.0
+    for _ in range(20):
+        press(session, DOWN)
+    assert session.command.vx == 0.0
+    for _ in range(9):
+        press(session, ord("B"))
+    assert session.command.beta == 1.0
+
+
+def test_the_restart_key_begins_anew_with_the_same_command(session):
+    press(session, UP)
+    session.step()
+    press(session, ord("R"))
+    assert session.steps == 0
+    assert session.command == Command(0.6, 0.0, 0.0, 0.5)

@@ -1,0 +1,75 @@
+"""Tests of what tables and files say of where they come from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import git
+import pytest
+from places import SHIPPED_POLICY
+
+from mute.acoustics.gains import GAINS_FILE
+from mute.acoustics.origin import sound_origin
+from mute.command_lines import evaluate
+from mute.support import provenance
+from mute.support.errors import MuteError
+
+SHIPPED = SHIPPED_POLICY
+
+
+@pytest.fixture
+def commit(tmp_path, monkeypatch) -> str:
+    """Make a repository with a program and a document in it the project's; return its commit."""
+    repository = git.Repo.init(tmp_path)
+    for name in ("program.py", "docs/table.json"):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("")
+        repository.index.add([name])
+    author = git.Actor("A", "a@example.org")
+    monkeypatch.setattr(provenance, "REPOSITORY", tmp_path)
+    return repository.index.commit("begin", author=author, committer=author).hexsha
+
+
+def test_a_changed_program_makes_the_commit_dirty(commit, tmp_path):
+    assert provenance.current_commit() == commit
+    (tmp_path / "program.py").write_text("pass\n")
+    assert provenance.current_commit() == f"{commit}-dirty"
+
+
+def test_a_result_written_to_the_documents_leaves_the_next_one_clean(commit, tmp_path):
+    (tmp_path / "docs" / "table.json").write_text("[]\n")
+    assert provenance.current_commit() == commit
+
+
+def test_outside_git_the_commit_is_unknown(tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "REPOSITORY", tmp_path)
+    assert provenance.current_commit() == "unknown"
+
+
+def test_the_origin_of_levels_names_the_policy_the_gains_the_commit_and_the_machine():
+    origin = sound_origin(SHIPPED)
+    assert origin["policy"] == "resources/go1/go1_mute.pt"
+    assert origin["policy_sha256"] == hashlib.sha256(SHIPPED.read_bytes()).hexdigest()
+    assert origin["calibration_sha256"] == hashlib.sha256(GAINS_FILE.read_bytes()).hexdigest()
+    assert origin["commit"] == provenance.current_commit()
+    assert "cores" in origin["machine"]
+
+
+def test_a_table_of_levels_has_its_origin_beside_it(tmp_path):
+    words = ["--surface", "wood", "--beta", "0", "--trials", "1", "--seconds", "1.5"]
+    evaluate.main(["noise", *words, "--sources", "fan", "--out", str(tmp_path)])
+    about = json.loads((tmp_path / "noise_about.json").read_text())
+    assert about.items() >= sound_origin(SHIPPED).items()
+
+
+def test_the_gains_that_ship_were_fitted_to_the_policy_that_ships():
+    fitted = json.loads(GAINS_FILE.read_text())["policy"]
+    assert fitted["sha256"] == provenance.file_sha256(SHIPPED)
+
+
+def test_a_file_that_cannot_be_read_is_told_in_one_line():
+    with pytest.raises(MuteError, match=r"cannot read absent\.pt: No such file"):
+        provenance.file_sha256(Path("absent.pt"))
