@@ -16,6 +16,7 @@ from tensordict import TensorDict
 
 from .commands import CommandSampler
 from .curriculum import Curriculum, curriculum
+from .engines import make_simulation
 from .footfall import Footfalls
 from .observations import OBS_DIM, noise_amplitude, policy_observation, slices
 from .quadruped_env_cfg import QuadrupedEnvCfg
@@ -23,7 +24,6 @@ from .randomization import PHYSICS_DIM, randomize_physics
 from .rewards import Motion, RewardSum
 from .scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS, build_scene
 from .sensors import RobotSensors
-from .simulation import make_simulation
 from .step_log import curriculum_log, episode_log, gait_log
 from .terrain import FlatTerrain, Terrain
 

@@ -7,9 +7,9 @@ import math
 import pytest
 import torch
 
+from mute.envs.batch_simulation import BatchSimulation
 from mute.envs.randomization import PHYSICS_DIM, RandomizationCfg, randomize_physics
 from mute.envs.scene import SceneCfg, build_scene
-from mute.envs.simulation import BatchSimulation
 
 MODEL = build_scene(SceneCfg())
 TRUNK = MODEL.body("trunk").id

@@ -8,9 +8,9 @@ import mujoco
 import pytest
 import torch
 
+from mute.envs.batch_simulation import BatchSimulation
 from mute.envs.scene import LEGS, SceneCfg, build_scene, make_spec
 from mute.envs.sensors import RobotSensors, sensor_slice
-from mute.envs.simulation import BatchSimulation
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,11 @@ import math
 import pytest
 import torch
 
+from mute.envs.batch_simulation import BatchSimulation
+from mute.envs.engines import make_simulation
 from mute.envs.scene import SceneCfg, build_scene
 from mute.envs.sensors import sensor_history, sensor_slice
-from mute.envs.simulation import BatchSimulation, Engine, make_simulation
+from mute.envs.simulation import Engine
 
 MODEL = build_scene(SceneCfg())
 LIVE = ("qpos", "qvel", "ctrl", "sensordata", "actuator_force")

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 import torch
 
+from mute.envs.batch_simulation import BatchSimulation
+from mute.envs.engines import make_simulation
 from mute.envs.randomization import RandomizationCfg, randomize_physics
 from mute.envs.scene import SceneCfg, build_scene
-from mute.envs.simulation import BatchSimulation, make_simulation
 from mute.envs.warp_simulation import WarpSimulation
 
 MODEL = build_scene(SceneCfg(), foot_samples=4)

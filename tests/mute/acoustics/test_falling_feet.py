@@ -11,9 +11,9 @@ import pytest
 
 from mute.acoustics.contacts import Impacts
 from mute.acoustics.recorder import Recorder
+from mute.envs.batch_simulation import BatchSimulation
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.scene import FOOT_RADIUS, LEGS
-from mute.envs.simulation import BatchSimulation
 
 GRAVITY = 9.81
 TIMESTEP = 0.001

@@ -1,0 +1,36 @@
+"""The choice between the engines that stand behind `envs.simulation`."""
+
+from __future__ import annotations
+
+import mujoco
+import torch
+
+from .batch_simulation import BatchSimulation
+from .simulation import Engine, Simulation
+from .warp_simulation import WarpSimulation
+
+__all__ = ["make_simulation"]
+
+
+def make_simulation(
+    model: mujoco.MjModel,
+    num_envs: int,
+    device: str = "cpu",
+    num_threads: int = 0,
+    engine: Engine = "auto",
+) -> Simulation:
+    """Return a batch of simulations.
+
+    Args:
+        model: The compiled model.
+        num_envs: Number of simulations.
+        device: Device that `engine` is to run on; `mjbatch` runs on the CPU, whatever it is.
+        num_threads: Size of the thread pool of `mjbatch`; 0 takes every logical CPU.
+        engine: The engine; `auto` is `mjbatch` on the CPU and `warp` elsewhere.
+
+    Raises:
+        ValueError: If the engine is not installed, or there is no such device.
+    """
+    if engine == "mjbatch" or (engine == "auto" and torch.device(device).type == "cpu"):
+        return BatchSimulation(model, num_envs, num_threads)
+    return WarpSimulation(model, num_envs, device)
