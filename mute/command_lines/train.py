@@ -25,8 +25,8 @@ from mute.config import AgentCfg, TaskCfg, from_plain, to_plain
 from mute.envs.menagerie import SceneError
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.evaluation.noise_probe import NoiseProbe
+from mute.learning.displays import LiveDisplay, PlainDisplay
 from mute.learning.distributed import Ranks, joined_ranks
-from mute.learning.logger import LiveDisplay, PlainDisplay
 from mute.learning.runner import MuteRunner, Progress
 from mute.support.errors import EXIT_INTERRUPTED, MuteError
 from mute.support.files import replace_file
