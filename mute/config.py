@@ -52,7 +52,8 @@ class EstimationCfg:
 
     def robots_learnt_from(self, num_envs: int) -> int:
         """Return how many of a number of robots an update learns from."""
-        return max(1, int(self.robots_share * num_envs))
+        # The product may fall short of a whole number by a rounding: 0.29 * 100.
+        return max(1, int(self.robots_share * num_envs + 1.0e-6))
 
 
 @dataclass

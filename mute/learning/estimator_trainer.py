@@ -211,7 +211,9 @@ class EstimatorTrainer:
         num_envs = starts.shape[1]
         sums: dict[str, float] = {}
         drawn = torch.randperm(num_envs, device=starts.device)
-        batches = drawn[: self.cfg.robots_learnt_from(num_envs)].chunk(self.cfg.num_mini_batches)
+        learnt_from = drawn[: self.cfg.robots_learnt_from(num_envs)]
+        # `chunk` would make fewer where they do not divide evenly: 3 of 5 robots in 4.
+        batches = learnt_from.tensor_split(self.cfg.num_mini_batches)
         for env_ids in batches:
             state = (past["hidden"][env_ids], past["cell"][env_ids])
             estimate, _ = self.estimator.unroll(

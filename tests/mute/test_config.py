@@ -135,3 +135,10 @@ def test_a_share_of_the_robots_counts_against_the_mini_batches_of_the_estimator(
     TaskCfg(env, AgentCfg(estimation=EstimationCfg(num_mini_batches=4, robots_share=0.5)))
     with pytest.raises(ValueError, match=r"env\.num_envs \* .*robots_share or 4, got 5"):
         TaskCfg(env, AgentCfg(estimation=EstimationCfg(num_mini_batches=5, robots_share=0.5)))
+
+
+@pytest.mark.parametrize(
+    ("share", "robots", "expected"), [(0.29, 100, 29), (0.5, 5, 2), (1.0, 7, 7), (0.01, 8, 1)]
+)
+def test_a_share_of_the_robots_is_rounded_down_and_never_empty(share, robots, expected):
+    assert EstimationCfg(robots_share=share).robots_learnt_from(robots) == expected

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 import pytest
 import torch
+from learning_helpers import make_cfg
 from rsl_rl.storage import RolloutStorage
 from tensordict import TensorDict
 
@@ -15,6 +16,7 @@ from mute.config import EstimationCfg
 from mute.envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE
 from mute.learning import estimator_trainer as estimation
 from mute.learning.estimator_trainer import EstimatorTrainer, Labels, estimator_losses
+from mute.learning.runner import MuteRunner
 from mute.networks.estimator import Estimate, Estimator, EstimatorCfg
 
 OBS_DIM, NUM_HEIGHTS, NUM_ENVS, NUM_STEPS = 2, 3, 3, 20
@@ -272,6 +274,17 @@ def test_each_update_learns_from_a_share_of_the_robots_drawn_anew(monkeypatch):
         trainer.update(_make_rollout(index, set()), state)
     drawn = {tuple(sorted(labels.base_lin_vel[0, :, 0].int().tolist())) for labels in seen}
     assert drawn == {(0, 1), (0, 2), (1, 2)}
+
+
+@pytest.mark.parametrize(
+    ("robots", "parts", "sizes"), [(5, 4, [2, 1, 1, 1]), (7, 3, [3, 2, 2]), (8, 2, [4, 4])]
+)
+def test_robots_are_split_into_as_many_mini_batches_as_asked_for(monkeypatch, robots, parts, sizes):
+    cfg = make_cfg(iterations=2, num_envs=robots)
+    cfg.agent.estimation.num_mini_batches = parts
+    seen = _watch_labels(monkeypatch)
+    MuteRunner("go1_mute", cfg, None).train()  # the first rollout only waits
+    assert [labels.base_lin_vel.shape[1] for labels in seen] == sizes
 
 
 def test_what_is_learnt_from_does_not_change_with_the_storage():
