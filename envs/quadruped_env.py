@@ -30,10 +30,6 @@ from .terrain import FlatTerrain, Terrain
 __all__ = ["NUM_ACTIONS", "QuadrupedEnv"]
 
 NUM_ACTIONS = 12
-HEIGHT_OFFSET = 0.30
-"""Height that the critic's height map is centred on, m."""
-HEIGHT_SCALE = 0.1
-"""Difference in height that is 1 in the critic's height map, m."""
 
 
 class QuadrupedEnv(VecEnv):
@@ -368,7 +364,7 @@ class QuadrupedEnv(VecEnv):
         privileged = torch.cat(
             (
                 self.base_lin_vel,
-                (heights - HEIGHT_OFFSET) / HEIGHT_SCALE,
+                self.cfg.height_map.normalised(heights),
                 feet.raw_contact.float(),
                 feet.phase,
                 self.physics,

@@ -21,15 +21,24 @@ class HeightMapCfg:
     """Extent across the heading, m."""
     spacing: float = 0.15
     """Distance between neighbours, m."""
+    offset: float = 0.30
+    """Height of the trunk above a point for which critic and estimator see 0, m."""
+    scale: float = 0.1
+    """Difference in height that is 1 to them, m."""
 
     def __post_init__(self) -> None:
         """Check the lengths.
 
         Raises:
-            ValueError: If the spacing is not positive, an extent is negative, or one is infinite.
+            ValueError: If spacing or scale is not positive, an extent is negative, or one of them
+                is not finite.
         """
-        if not (math.isfinite(self.spacing) and self.spacing > 0.0):
-            raise ValueError(f"height_map.spacing must be > 0 and finite, got {self.spacing}")
+        for name in ("spacing", "scale"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"height_map.{name} must be > 0 and finite, got {value}")
+        if not math.isfinite(self.offset):
+            raise ValueError(f"height_map.offset must be finite, got {self.offset}")
         for name in ("length", "width"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
@@ -40,6 +49,14 @@ class HeightMapCfg:
         along = _centred(self.length, self.spacing, device)
         across = _centred(self.width, self.spacing, device)
         return torch.cartesian_prod(along, across)
+
+    def normalised(self, heights: torch.Tensor) -> torch.Tensor:
+        """Return heights in m as critic and estimator see them."""
+        return (heights - self.offset) / self.scale
+
+    def metres(self, normalised: torch.Tensor) -> torch.Tensor:
+        """Return normalised heights in m."""
+        return self.offset + self.scale * normalised
 
 
 class Terrain(ABC):

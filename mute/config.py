@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import cattrs
 
+from mute.config_versions import upgraded
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.networks.estimator import EstimatorCfg
 
@@ -239,7 +240,7 @@ def to_plain(cfg: TaskCfg) -> dict[str, Any]:
 
 
 def from_plain(data: dict[str, Any] | None) -> TaskCfg:
-    """Make a configuration from what `to_plain` returned.
+    """Make a configuration from what `to_plain` returned, in this version or an earlier one.
 
     Raises:
         ValueError: If a field is missing where it must not be, unknown, or out of its range.
@@ -247,7 +248,7 @@ def from_plain(data: dict[str, Any] | None) -> TaskCfg:
     if not isinstance(data, dict):
         raise ValueError(f"configuration must be a dictionary, got {type(data).__name__}")
     try:
-        return _converter.structure(data, TaskCfg)
+        return _converter.structure(upgraded(data), TaskCfg)
     except cattrs.BaseValidationError as error:
         reasons = "; ".join(cattrs.transform_error(error, format_exception=_reason))
         raise ValueError(f"configuration does not fit this version: {reasons}") from error

@@ -26,7 +26,7 @@ _LOG_VAR_RANGE = (-10.0, 5.0)
 
 @dataclass
 class EstimatorCfg:
-    """Sizes and scales of the estimator."""
+    """Sizes of the estimator."""
 
     lstm_hidden: int = 128
     """Width of the LSTM's hidden state."""
@@ -40,12 +40,6 @@ class EstimatorCfg:
     phase_hidden: tuple[int, ...] = (64,)
     """Widths of the hidden layers of the phase network."""
 
-    height_offset: float = 0.30
-    """Height of the trunk above the ground for which the height head gives 0, in m."""
-
-    height_scale: float = 0.1
-    """Difference in height for which the height head gives 1, in m."""
-
     activation: Literal["elu", "relu", "tanh"] = "elu"
     """Activation of the decoder and of the phase network."""
 
@@ -53,15 +47,13 @@ class EstimatorCfg:
         """Check the values.
 
         Raises:
-            ValueError: If a size or the height scale is not positive, or the activation is unknown.
+            ValueError: If a size is not positive, or the activation is unknown.
         """
         sizes = {"lstm_hidden": (self.lstm_hidden,), "latent_dim": (self.latent_dim,)}
         sizes |= {"decoder_hidden": self.decoder_hidden, "phase_hidden": self.phase_hidden}
         for name, widths in sizes.items():
             if any(width < 1 for width in widths):
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
-        if not self.height_scale > 0.0:
-            raise ValueError(f"height_scale must be positive, got {self.height_scale}")
         if self.activation not in _ACTIVATIONS:
             raise ValueError(
                 f"activation must be one of {list(_ACTIVATIONS)}, got {self.activation!r}"
@@ -103,17 +95,26 @@ class Estimator(nn.Module):
     """
 
     def __init__(
-        self, obs_dim: int, num_heights: int, cfg: EstimatorCfg | None = None, num_feet: int = 4
+        self,
+        obs_dim: int,
+        num_heights: int,
+        cfg: EstimatorCfg | None = None,
+        num_feet: int = 4,
+        height_offset: float = 0.0,
+        height_scale: float = 1.0,
     ) -> None:
         """Build the networks.
 
         Args:
             obs_dim: Size of an observation.
             num_heights: Number of points of the height map.
-            cfg: Sizes and scales; the defaults if left out.
+            cfg: Sizes; the defaults if left out.
             num_feet: Number of feet.
+            height_offset: Height for which the height head gives 0, m; the environment's.
+            height_scale: Difference in height for which it gives 1, m; the environment's.
         """
         super().__init__()
+        self.height_offset, self.height_scale = height_offset, height_scale
         self.cfg = cfg = cfg if cfg is not None else EstimatorCfg()
         # LSTMCell holds the weights; its equations are those of `networks.lstm`.
         self.lstm = nn.LSTMCell(obs_dim, cfg.lstm_hidden)
@@ -218,6 +219,14 @@ class Estimator(nn.Module):
         """Predict the next observation from the latent: (., latent_dim) to (., obs_dim)."""
         return self.decoder(latent)
 
+    def metres(self, normalised: Tensor) -> Tensor:
+        """Return what the height head gives in m."""
+        return self.height_offset + self.height_scale * normalised
+
+    def normalised(self, heights: Tensor) -> Tensor:
+        """Return heights in m as the height head gives them."""
+        return (heights - self.height_offset) / self.height_scale
+
     def _lstm_weights(self) -> Weights:
         lstm = self.lstm
         return Weights(lstm.weight_ih, lstm.weight_hh, lstm.bias_ih + lstm.bias_hh)
@@ -244,8 +253,7 @@ class Estimator(nn.Module):
         phase = torch.sigmoid(
             self.phase_network(torch.cat((heights, base_lin_vel, latent), dim=-1))
         )
-        metres = self.cfg.height_offset + self.cfg.height_scale * heights
-        return Estimate(base_lin_vel, metres, mean, log_var, latent, phase)
+        return Estimate(base_lin_vel, self.metres(heights), mean, log_var, latent, phase)
 
 
 def _sample(mean: Tensor, log_var: Tensor, generator: torch.Generator | None) -> Tensor:

@@ -14,6 +14,7 @@ from typing import Annotated, TypeVar
 
 import tyro
 
+from mute.config_versions import MOVED
 from mute.support.errors import MuteError
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "check_video",
     "check_wav",
     "command_line",
+    "current_spelling",
     "make_directory",
     "parse",
     "resolve_device",
@@ -84,6 +86,17 @@ def parse(
         return _in_one_line(read)
     except ValueError as error:
         raise MuteError(str(error)) from error
+
+
+def current_spelling(argv: Sequence[str]) -> list[str]:
+    """Return a command line with the options of earlier versions as they are called now."""
+    return [_current_option(word) if word.startswith("--") else word for word in argv]
+
+
+def _current_option(word: str) -> str:
+    option, equals, value = word.removeprefix("--").partition("=")
+    moved = MOVED.get(option.replace("-", "_"))
+    return f"--{moved.replace('_', '-')}{equals}{value}" if moved else word
 
 
 def selected_task(argv: Sequence[str], default: str) -> str:

@@ -20,7 +20,13 @@ from mute.checkpoint import (
     load_checkpoint,
     newest_checkpoint,
 )
-from mute.command_lines.arguments import command_line, parse, resolve_device, selected_task
+from mute.command_lines.arguments import (
+    command_line,
+    current_spelling,
+    parse,
+    resolve_device,
+    selected_task,
+)
 from mute.config import AgentCfg, TaskCfg, from_plain, to_plain
 from mute.envs.menagerie import SceneError
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
@@ -201,7 +207,7 @@ def _check_resume(args: TrainArgs, path: Path, seed: int, iteration: int) -> Non
 
 def _parse(argv: Sequence[str], task: str, cfg: TaskCfg) -> TrainArgs:
     default = TrainArgs(task=task, env=cfg.env, agent=cfg.agent)
-    return parse(TrainArgs, argv, "Learn a task.", default)
+    return parse(TrainArgs, current_spelling(argv), "Learn a task.", default)
 
 
 def _configuration(args: TrainArgs) -> TaskCfg:

@@ -13,7 +13,7 @@ from mute.checkpoint import CheckpointError, first_line, load_checkpoint
 from mute.config import TaskCfg, from_plain
 from mute.envs.observations import OBS_DIM
 from mute.envs.quadruped_env import NUM_ACTIONS
-from mute.learning.estimated_env import estimate_group
+from mute.learning.estimated_env import estimate_group, make_estimator
 from mute.learning.storage import PreparedModel
 from mute.networks.estimator import Estimate, Estimator
 
@@ -57,8 +57,7 @@ def make_policy(saved: dict[str, Any]) -> Policy:
         KeyError, TypeError, ValueError or RuntimeError: If that is incomplete or does not fit.
     """
     cfg = from_plain(saved["config"])
-    num_heights = cfg.env.height_map.grid().shape[0]
-    estimator = Estimator(OBS_DIM, num_heights, cfg.agent.estimation.network)
+    estimator = make_estimator(cfg)
     estimator.load_state_dict(saved["estimator_state_dict"])
     actor = _actor(cfg, estimator)
     actor.load_state_dict(saved["actor_state_dict"])

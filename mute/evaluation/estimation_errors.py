@@ -9,7 +9,7 @@ from tensordict import TensorDict
 
 from mute.controllers.learned import LearnedController
 from mute.envs.phase import hindsight_phase
-from mute.envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE, QuadrupedEnv
+from mute.envs.quadruped_env import QuadrupedEnv
 
 __all__ = ["EstimationErrors", "EstimationMeter"]
 
@@ -55,7 +55,7 @@ class EstimationMeter:
             raise ValueError("the controller has not acted yet")
         privileged, columns = observations["privileged"], self._env.privileged_slices
         velocity = privileged[:, columns["base_lin_vel"]]
-        heights = HEIGHT_OFFSET + HEIGHT_SCALE * privileged[:, columns["heights"]]
+        heights = self._env.cfg.height_map.metres(privileged[:, columns["heights"]])
         self._velocity.append((estimate.base_lin_vel - velocity).square().mean())
         self._height.append((estimate.heights - heights).square().mean())
         self._contact.append(privileged[:, columns["contact"]] > 0.5)

@@ -12,12 +12,26 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
+from mute.config import TaskCfg
+from mute.envs.observations import OBS_DIM
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.networks.estimator import Estimate, Estimator, State
 from mute.support.threads import use_collection_threads, use_learning_threads
 
-__all__ = ["EstimatedEnv", "estimate_group"]
+__all__ = ["EstimatedEnv", "estimate_group", "make_estimator"]
+
+
+def make_estimator(cfg: TaskCfg) -> Estimator:
+    """Return a new estimator for a task's observations, in the scale of its height map."""
+    heights = cfg.env.height_map
+    return Estimator(
+        OBS_DIM,
+        heights.grid().shape[0],
+        cfg.agent.estimation.network,
+        height_offset=heights.offset,
+        height_scale=heights.scale,
+    )
 
 
 def estimate_group(estimate: Estimate, estimator: Estimator, with_phase: bool) -> torch.Tensor:
@@ -28,9 +42,7 @@ def estimate_group(estimate: Estimate, estimator: Estimator, with_phase: bool) -
         estimator: The estimator that made them, for the heights' scale.
         with_phase: Whether the phase is part of the group.
     """
-    cfg = estimator.cfg
-    heights = (estimate.heights - cfg.height_offset) / cfg.height_scale
-    parts = [estimate.base_lin_vel, heights, estimate.latent]
+    parts = [estimate.base_lin_vel, estimator.normalised(estimate.heights), estimate.latent]
     return torch.cat([*parts, estimate.phase] if with_phase else parts, dim=-1)
 
 

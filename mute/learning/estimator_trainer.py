@@ -15,7 +15,6 @@ from torch import Tensor, nn
 
 from mute.config import EstimationCfg
 from mute.envs.phase import hindsight_phase
-from mute.envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE
 from mute.learning.distributed import Ranks
 from mute.learning.optimizer import FusedAdam
 from mute.networks.estimator import Estimate, Estimator, State
@@ -70,6 +69,7 @@ def estimator_losses(
     next_obs_hat: Tensor,
     labels: Labels,
     cfg: EstimationCfg,
+    height_scale: float,
     ranks: Ranks | None = None,
 ) -> Losses:
     """Return the losses of a batch of sequences.
@@ -78,8 +78,9 @@ def estimator_losses(
         estimate: Estimates. Shapes: (T, N, ...).
         next_obs_hat: The decoder's prediction of the next observation. Shape: (T, N, obs_dim).
         labels: Truth.
-        cfg: Weights, and the scale in which heights are counted: metres would make their share of
-            the loss vanish.
+        cfg: Weights.
+        height_scale: What counts as 1 in heights, m: counted in metres, their share of the loss
+            would vanish.
         ranks: Processes whose mean loss is meant: a sample then weighs the same wherever it is.
     """
     ranks = ranks or Ranks()
@@ -87,7 +88,7 @@ def estimator_losses(
     num_valid, num_closed = ranks.mean(counts).clamp(min=1.0 / ranks.world_size)
     velocity_error = (estimate.base_lin_vel - labels.base_lin_vel).square().mean()
     height_error = (estimate.heights - labels.heights).square().mean()
-    estimation = velocity_error + height_error / cfg.network.height_scale**2
+    estimation = velocity_error + height_error / height_scale**2
     reconstruction = _masked_mean(
         (next_obs_hat - labels.next_obs).square().mean(dim=-1), labels.next_valid, num_valid
     )
@@ -176,7 +177,7 @@ class EstimatorTrainer:
         return {
             "obs": storage.observations["policy"].clone(),
             "base_lin_vel": privileged[..., self._privileged["base_lin_vel"]].clone(),
-            "heights": HEIGHT_OFFSET + HEIGHT_SCALE * privileged[..., self._privileged["heights"]],
+            "heights": self.estimator.metres(privileged[..., self._privileged["heights"]]),
             "contact": privileged[..., self._privileged["contact"]] > 0.5,
             "dones": storage.dones[..., 0].bool(),
             "hidden": initial_state[0].clone(),
@@ -220,7 +221,10 @@ class EstimatorTrainer:
                 past["obs"][:, env_ids], state, starts[:, env_ids], sample=True
             )
             decoded = self.estimator.decode(estimate.latent)
-            losses = estimator_losses(estimate, decoded, labels.select(env_ids), self.cfg, ranks)
+            chosen = labels.select(env_ids)
+            losses = estimator_losses(
+                estimate, decoded, chosen, self.cfg, self.estimator.height_scale, ranks
+            )
             self.optimizer.zero_grad()
             losses.total.backward()
             ranks.average_gradients(self.estimator.parameters())

@@ -16,16 +16,15 @@ from rsl_rl.runners import OnPolicyRunner
 
 from mute.checkpoint import CheckpointError, first_line, load_checkpoint, save_checkpoint
 from mute.config import TaskCfg, to_plain
-from mute.envs.observations import OBS_DIM
+from mute.config_versions import check_resumable
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.learning.algorithm import EstimatorPPO
 from mute.learning.distributed import Ranks
-from mute.learning.estimated_env import EstimatedEnv
+from mute.learning.estimated_env import EstimatedEnv, make_estimator
 from mute.learning.estimator_trainer import EstimatorTrainer
 from mute.learning.logger import TrainingLogger
 from mute.learning.symmetry import groups, tie_actor_critic, tie_estimator
-from mute.networks.estimator import Estimator
 from mute.support.threads import core_share, use_collection_threads
 
 __all__ = ["MuteRunner", "NoiseProbe", "Progress", "policy_part"]
@@ -81,7 +80,7 @@ class MuteRunner(OnPolicyRunner):
         self.task, self.task_cfg = task, cfg
         env = QuadrupedEnv(_own_share(cfg.env, self.ranks), device)
         estimation = cfg.agent.estimation
-        estimator = Estimator(OBS_DIM, env.grid.shape[0], estimation.network).to(device)
+        estimator = make_estimator(cfg).to(device)
         if cfg.agent.symmetric:
             tie_estimator(env, estimator)
         estimated = EstimatedEnv(env, estimator, device, estimation.actor_uses_phase)
@@ -176,6 +175,7 @@ class MuteRunner(OnPolicyRunner):
         try:
             if self.task_cfg.agent.symmetric and not checkpoint["config"]["agent"]["symmetric"]:
                 raise ValueError("agent.symmetric is true, and its networks were trained without")
+            check_resumable(checkpoint["config"])
             own = _part_of_rank(checkpoint, self.ranks)
             checkpoint["estimator_trainer"]["past"] = {} if own is None else own["estimator_past"]
             self.alg.load(checkpoint, load_cfg, strict)

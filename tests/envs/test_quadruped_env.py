@@ -9,12 +9,13 @@ import torch
 
 from mute.envs.commands import CommandsCfg
 from mute.envs.observations import OBSERVATION_WIDTHS, ObservationsCfg, slices
-from mute.envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE, QuadrupedEnv
+from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
 from mute.envs.rewards import TERMS, RewardsCfg
 from mute.envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS
 from mute.envs.sensors import sensor_slice
+from mute.envs.terrain import HeightMapCfg
 
 POLICY = slices(OBSERVATION_WIDTHS)
 QUIET = {"observations": ObservationsCfg(noise_level=0.0)}
@@ -121,12 +122,13 @@ def test_the_true_velocity_is_turned_into_the_body_frame():
 
 
 def test_the_critic_sees_heights_contacts_and_physics():
-    env = _make_env(2, initial_velocity=0.0)
+    height_map = HeightMapCfg(offset=0.25, scale=0.5)
+    env = _make_env(2, initial_velocity=0.0, height_map=height_map)
     _hang(env, 1)
     privileged = _stand_still(env, 10)[0]["privileged"]
     columns = env.privileged_slices
     heights = privileged[:, columns["heights"]]
-    expected = (env.simulation.qpos[:, 2:3] - HEIGHT_OFFSET) / HEIGHT_SCALE
+    expected = (env.simulation.qpos[:, 2:3] - 0.25) / 0.5
     torch.testing.assert_close(heights, expected.expand(2, 35))
     assert (privileged[0, columns["contact"]] == 1.0).all()
     assert (privileged[1, columns["contact"]] == 0.0).all()

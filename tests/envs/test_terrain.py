@@ -46,11 +46,20 @@ def test_the_grid_runs_across_first_and_then_along():
         ("length", math.nan),
         ("width", -0.1),
         ("width", math.inf),
+        ("scale", 0.0),
+        ("scale", math.inf),
+        ("offset", math.nan),
     ],
 )
 def test_a_bad_grid_is_refused_by_name_with_its_value(field, value):
     with pytest.raises(ValueError, match=rf"height_map\.{field} must be .*got {value}"):
         HeightMapCfg(**{field: value})
+
+
+def test_heights_are_normalised_by_offset_and_scale_and_come_back():
+    cfg, heights = HeightMapCfg(offset=0.2, scale=0.5), torch.tensor([0.2, 0.7, 0.0])
+    torch.testing.assert_close(cfg.normalised(heights), torch.tensor([0.0, 1.0, -0.4]))
+    torch.testing.assert_close(cfg.metres(cfg.normalised(heights)), heights)
 
 
 def test_a_grid_without_extent_is_the_point_under_the_trunk():

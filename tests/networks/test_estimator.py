@@ -15,7 +15,7 @@ OBS_DIM, NUM_HEIGHTS, NUM_ENVS, NUM_STEPS = 5, 6, 3, 7
 def _make_estimator(seed=0):
     torch.manual_seed(seed)
     cfg = EstimatorCfg(lstm_hidden=8, latent_dim=4, decoder_hidden=(8,), phase_hidden=(8,))
-    return Estimator(OBS_DIM, NUM_HEIGHTS, cfg)
+    return Estimator(OBS_DIM, NUM_HEIGHTS, cfg, height_offset=0.25, height_scale=0.5)
 
 
 def _make_sequence(seed=1):
@@ -46,7 +46,6 @@ def test_one_step_of_a_tiny_network_is_the_hand_computed_one():
 
 def test_an_estimate_is_what_each_head_says_of_the_hidden_state():
     estimator = _make_estimator()
-    cfg = estimator.cfg
     with torch.no_grad():
         estimator.latent_log_var_head.bias.copy_(torch.tensor([-30.0, 0.0, 0.1, 30.0]))
     obs, state, _ = _make_sequence()
@@ -56,7 +55,7 @@ def test_an_estimate_is_what_each_head_says_of_the_hidden_state():
     phase = estimator.phase_network(torch.cat((heights, velocity, mean), dim=-1)).sigmoid()
     close = torch.testing.assert_close
     close(estimate.base_lin_vel, velocity)
-    close(estimate.heights, cfg.height_offset + cfg.height_scale * heights)
+    close(estimate.heights, 0.25 + 0.5 * heights)
     close(estimate.latent_mean, mean)
     close(estimate.latent, mean)
     close(estimate.latent_log_var, estimator.latent_log_var_head(hidden).clamp(-10.0, 5.0))
@@ -148,14 +147,14 @@ def test_a_silent_height_head_says_the_offset_and_one_unit_is_the_scale():
         estimator.heights_head.bias.copy_(torch.tensor([0.0, 1.0, -1.0, 0.0, 0.0, 0.0]))
     obs, state, _ = _make_sequence()
     heights = estimator.step(obs[0], state)[0].heights[0]
-    assert heights.tolist() == pytest.approx([0.30, 0.40, 0.20, 0.30, 0.30, 0.30])
+    assert heights.tolist() == pytest.approx([0.25, 0.75, -0.25, 0.25, 0.25, 0.25])
 
 
 def test_the_phase_network_reads_normalised_heights_then_velocity_then_latent():
     estimator = _make_estimator()
     obs, state, _ = _make_sequence()
     estimate, _ = estimator.step(obs[0], state)
-    inputs = ((estimate.heights - 0.30) / 0.1, estimate.base_lin_vel, estimate.latent)
+    inputs = ((estimate.heights - 0.25) / 0.5, estimate.base_lin_vel, estimate.latent)
     expected = estimator.phase_network(torch.cat(inputs, dim=-1)).sigmoid()
     torch.testing.assert_close(estimate.phase, expected, atol=1e-5, rtol=0)
 
@@ -243,7 +242,6 @@ def test_starts_of_another_shape_are_refused():
     [
         ("lstm_hidden", 0),
         ("decoder_hidden", (64, 0)),
-        ("height_scale", 0.0),
         ("activation", "sine"),
     ],
 )

@@ -261,6 +261,13 @@ def test_an_option_that_a_resumed_run_cannot_heed_is_refused(arguments, words, f
     assert all(word in error for word in words), error
 
 
+def test_options_of_earlier_versions_are_still_understood():
+    args, _ = train._arguments(
+        ["--agent.estimation.network.height-scale", "0.2", "--env.height-map.offset=0.28"]
+    )
+    assert (args.env.height_map.scale, args.env.height_map.offset) == (0.2, 0.28)
+
+
 def test_the_seed_that_a_resumed_run_has_may_be_given(finished):
     path = str(finished[0] / "model_2.pt")
     args, checkpoint = train._arguments(["--resume", path, "--seed", "5"])

@@ -79,6 +79,30 @@ def test_the_small_file_gives_the_same_policy_as_the_whole_checkpoint(trained, t
     assert torch.equal(*actions)
 
 
+def test_heights_are_estimated_in_the_scale_that_an_earlier_version_gave_the_estimator(
+    trained, tmp_path
+):
+    runner, path = trained
+    small = policy_part(load_checkpoint(path))
+    del (
+        small["config"]["env"]["height_map"]["offset"],
+        small["config"]["env"]["height_map"]["scale"],
+    )
+    small["config"]["agent"]["estimation"]["network"] |= {
+        "height_offset": 0.25,
+        "height_scale": 0.5,
+    }
+    save_checkpoint(tmp_path / "old.pt", small)
+    observations, heights = runner.env.get_observations(), []
+    for file in (path, tmp_path / "old.pt"):
+        controller = LearnedController(load_policy(file), NUM_ENVS)
+        controller.act(observations)
+        assert controller.estimate is not None
+        heights.append(controller.estimate.heights)
+    given = (heights[0] - 0.30) / 0.1  # what the height head says
+    torch.testing.assert_close(heights[1], 0.25 + 0.5 * given)
+
+
 def test_a_policy_that_does_not_see_the_phase_is_driven_without(tmp_path):
     cfg = make_cfg(1)
     cfg.agent.estimation.actor_uses_phase = False

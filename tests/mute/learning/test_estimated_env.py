@@ -66,7 +66,7 @@ NONE = [False, False, False]
 
 
 def test_the_group_is_velocity_normalised_heights_latent_and_phase_in_this_order():
-    estimator = Estimator(OBS_DIM, 2, CFG)
+    estimator = Estimator(OBS_DIM, 2, CFG, height_offset=0.30, height_scale=0.1)
     estimate = Estimate(
         base_lin_vel=torch.tensor([[1.0, 2.0, 3.0]]),
         heights=torch.tensor([[0.30, 0.45]]),

@@ -13,7 +13,6 @@ from rsl_rl.storage import RolloutStorage
 from tensordict import TensorDict
 
 from mute.config import EstimationCfg
-from mute.envs.quadruped_env import HEIGHT_OFFSET, HEIGHT_SCALE
 from mute.learning import estimator_trainer as estimation
 from mute.learning.estimator_trainer import EstimatorTrainer, Labels, estimator_losses
 from mute.learning.runner import MuteRunner
@@ -22,6 +21,7 @@ from mute.networks.estimator import Estimate, Estimator, EstimatorCfg
 OBS_DIM, NUM_HEIGHTS, NUM_ENVS, NUM_STEPS = 2, 3, 3, 20
 PRIVILEGED = {"base_lin_vel": slice(0, 3), "heights": slice(3, 6), "contact": slice(6, 10)}
 NETWORK = EstimatorCfg(lstm_hidden=5, latent_dim=2, decoder_hidden=(4,), phase_hidden=(4,))
+HEIGHT_SCALE = 0.1
 # Swing and stance of each foot in steps, and where in its stride it starts.
 SWING = torch.tensor([3, 4, 5, 6])
 STANCE = torch.tensor([4, 3, 6, 5])
@@ -64,19 +64,19 @@ L_PHASE = 0.5 / 4.0
 
 
 def test_each_loss_is_its_hand_computed_value():
-    losses = estimator_losses(*_make_case(), CFG)
+    losses = estimator_losses(*_make_case(), CFG, HEIGHT_SCALE)
     assert float(losses.estimation) == pytest.approx(L_EST, rel=1e-5)
     assert float(losses.forward) == pytest.approx(L_FWD, rel=1e-5)
     assert float(losses.phase) == pytest.approx(L_PHASE, rel=1e-5)
 
 
 def test_the_total_is_the_papers_weighted_sum():
-    losses = estimator_losses(*_make_case(), CFG)
+    losses = estimator_losses(*_make_case(), CFG, HEIGHT_SCALE)
     assert float(losses.total) == pytest.approx(L_EST + 3.0 * L_FWD + 5.0 * L_PHASE, rel=1e-5)
 
 
 def test_the_errors_shown_are_in_physical_units():
-    losses = estimator_losses(*_make_case(), CFG)
+    losses = estimator_losses(*_make_case(), CFG, HEIGHT_SCALE)
     assert float(losses.velocity_rmse) == pytest.approx(math.sqrt(10.0 / 6.0), rel=1e-5)
     assert float(losses.height_rmse) == pytest.approx(0.1, rel=1e-5)
     assert float(losses.phase_mae) == pytest.approx(0.25, rel=1e-5)
@@ -86,22 +86,22 @@ def test_the_kl_is_summed_over_the_latent_and_averaged_over_the_batch():
     estimate, decoded, labels = _make_case()
     wide = estimate._replace(latent_mean=torch.ones(2, 1, 8), latent_log_var=torch.zeros(2, 1, 8))
     labels.next_valid = torch.zeros(2, 1, dtype=torch.bool)
-    losses = estimator_losses(wide, decoded, labels, CFG)
+    losses = estimator_losses(wide, decoded, labels, CFG, HEIGHT_SCALE)
     assert float(losses.forward) == pytest.approx(0.1 * 8 * 0.5, rel=1e-5)
 
 
 def test_a_next_observation_of_another_episode_does_not_count():
     estimate, decoded, labels = _make_case()
-    before = float(estimator_losses(estimate, decoded, labels, CFG).forward)
+    before = float(estimator_losses(estimate, decoded, labels, CFG, HEIGHT_SCALE).forward)
     labels.next_obs[1] = 1.0e6
-    assert float(estimator_losses(estimate, decoded, labels, CFG).forward) == before
+    assert float(estimator_losses(estimate, decoded, labels, CFG, HEIGHT_SCALE).forward) == before
 
 
 def test_an_open_phase_does_not_count():
     estimate, decoded, labels = _make_case()
-    before = float(estimator_losses(estimate, decoded, labels, CFG).phase)
+    before = float(estimator_losses(estimate, decoded, labels, CFG, HEIGHT_SCALE).phase)
     labels.phase[0, 0, 2] = 1.0e6
-    assert float(estimator_losses(estimate, decoded, labels, CFG).phase) == before
+    assert float(estimator_losses(estimate, decoded, labels, CFG, HEIGHT_SCALE).phase) == before
 
 
 def test_with_everything_masked_losses_and_gradients_are_zero_and_not_nan():
@@ -109,7 +109,7 @@ def test_with_everything_masked_losses_and_gradients_are_zero_and_not_nan():
     phase, decoded = estimate.phase.requires_grad_(), decoded.requires_grad_()
     labels.phase_closed = torch.zeros_like(labels.phase_closed)
     labels.next_valid = torch.zeros_like(labels.next_valid)
-    losses = estimator_losses(estimate._replace(phase=phase), decoded, labels, CFG)
+    losses = estimator_losses(estimate._replace(phase=phase), decoded, labels, CFG, HEIGHT_SCALE)
     losses.total.backward()
     assert losses.phase.item() == 0.0
     assert losses.phase_mae.item() == 0.0
@@ -158,7 +158,9 @@ def _make_rollout(index: int, ends: set[tuple[int, int]]) -> RolloutStorage:
 
 def _make_trainer(learning_rate: float = 1.0e-3, robots_share: float = 1.0) -> EstimatorTrainer:
     torch.manual_seed(0)
-    estimator = Estimator(OBS_DIM, NUM_HEIGHTS, NETWORK)
+    estimator = Estimator(
+        OBS_DIM, NUM_HEIGHTS, NETWORK, height_offset=0.5, height_scale=HEIGHT_SCALE
+    )
     cfg = EstimationCfg(
         network=NETWORK,
         num_mini_batches=1,
@@ -173,9 +175,9 @@ def _watch_labels(monkeypatch) -> list[Labels]:
     seen: list[Labels] = []
     losses = estimation.estimator_losses
 
-    def spy(estimate, decoded, labels, cfg, ranks):
+    def spy(estimate, decoded, labels, *rest):
         seen.append(labels)
-        return losses(estimate, decoded, labels, cfg, ranks)
+        return losses(estimate, decoded, labels, *rest)
 
     monkeypatch.setattr(estimation, "estimator_losses", spy)
     return seen
@@ -202,7 +204,7 @@ def test_labels_are_those_of_the_rollout_before(monkeypatch):
     labels = _labels_after(monkeypatch, rollouts=3)
     time = torch.arange(NUM_STEPS, 2.0 * NUM_STEPS)
     assert torch.equal(labels.base_lin_vel[:, 1, 1], time)
-    assert torch.allclose(labels.heights, torch.tensor(HEIGHT_OFFSET + 2.0 * HEIGHT_SCALE))
+    assert torch.allclose(labels.heights, torch.tensor(0.5 + 2.0 * HEIGHT_SCALE))
 
 
 def test_between_two_others_every_phase_of_a_walk_is_known_and_in_closed_form(monkeypatch):

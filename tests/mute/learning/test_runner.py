@@ -11,7 +11,7 @@ import torch
 from learning_helpers import differences, everything, make_cfg, make_runner
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from mute.checkpoint import CheckpointError, load_checkpoint
+from mute.checkpoint import CheckpointError, load_checkpoint, save_checkpoint
 from mute.learning.logger import CurveWriter
 from mute.learning.runner import MuteRunner, policy_part
 from mute.tasks import make_task
@@ -138,6 +138,14 @@ def test_a_checkpoint_of_another_configuration_is_refused_in_one_line(whole_run,
         runner.load(str(directory / "model_3.pt"))
     assert "model_3.pt does not fit this configuration" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_checkpoint_whose_critic_saw_heights_in_another_scale_is_not_resumed(whole_run, tmp_path):
+    saved = load_checkpoint(whole_run[0] / "model_3.pt")
+    saved["config"]["agent"]["estimation"]["network"]["height_scale"] = 0.2
+    save_checkpoint(tmp_path / "old.pt", saved)
+    with pytest.raises(CheckpointError, match=r"network\.height_scale was 0\.2 for the estimator"):
+        make_runner(tmp_path, iterations=5).load(str(tmp_path / "old.pt"))
 
 
 def test_ctrl_c_ends_the_iteration_saves_it_and_the_rest_gives_the_same_result(whole_run, tmp_path):
