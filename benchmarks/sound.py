@@ -12,6 +12,7 @@ from mute.support.threads import configure_threads
 
 configure_threads()  # before torch is imported
 
+import dataclasses
 import json
 import time
 from collections.abc import Callable, Sequence
@@ -149,7 +150,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         make_directory(args.out.parent)
     work = ((args.seconds, False), (2.0 * args.seconds, True))
     once, twice = (
-        call_apart("benchmarks.sound", "measure", str(args.policy), args.trials, *walk)
+        call_apart(measure, str(args.policy), args.trials, *walk)
         for walk in (work if args.json else track(work, "walks"))
     )
     content = {
@@ -158,16 +159,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         "trials": args.trials,
         "seconds": args.seconds,
         "machine": machine_kind(),
-        "parts": once["parts"],
-        "memory_mb": once["memory_mb"],
-        "memory_growth_mb": twice["memory_mb"] - once["memory_mb"],
+        "parts": [dataclasses.asdict(part) for part in once.parts],
+        "memory_mb": once.memory_mb,
+        "memory_growth_mb": twice.memory_mb - once.memory_mb,
     }
     if args.out is not None:
         write_json(args.out, content)
     if args.json:
         print(json.dumps(content))
     else:
-        print_table(content["machine"], once["parts"], list(Part.__annotations__))
+        print_table(content["machine"], content["parts"], list(Part.__annotations__))
         print(
             f"memory of the whole: {content['memory_mb']:.0f} MB; for twice the seconds "
             f"{content['memory_growth_mb']:+.0f} MB"

@@ -33,6 +33,7 @@ from mute.envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
 from mute.evaluation.tables import print_table, write_json
 from mute.learning.runner import MuteRunner
 from mute.support.errors import MuteError
+from mute.support.memory import keep_freed_memory
 from mute.support.processes import call_apart, peak_memory_mb
 from mute.support.provenance import machine_kind
 from mute.support.threads import use_collection_threads, use_learning_threads
@@ -162,7 +163,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if args.rollouts < 1:
         raise MuteError(f"--rollouts must be >= 1, got {args.rollouts}")
     sizes = args.num_envs if args.json else track(args.num_envs, "environments")
-    rows = [_in_process(args.task, num_envs, args.rollouts) for num_envs in sizes]
+    rows = [_rates_apart(args.task, num_envs, args.rollouts) for num_envs in sizes]
     peer_rows = _peer_rows(args, peers)
     content = {"task": args.task, "machine": machine_kind(), "rates": rows, "peers": peer_rows}
     if args.out is not None:
@@ -184,11 +185,17 @@ def _peer_rows(args: BenchmarkArgs, peers: Sequence[str]) -> list[dict[str, Any]
     return [dataclasses.asdict(time_peer(name, pythons.get(name), *shape)) for name in names]
 
 
-def _in_process(task: str, num_envs: int, rollouts: int) -> dict[str, float]:
+def _rates_apart(task: str, num_envs: int, rollouts: int) -> dict[str, float]:
     try:
-        return call_apart("mute.benchmark", "measure", task, num_envs, rollouts)
+        return dataclasses.asdict(call_apart(_measure_as_trained, task, num_envs, rollouts))
     except MuteError as error:
         raise MuteError(f"--num-envs {num_envs}: {error}") from error
+
+
+def _measure_as_trained(task: str, num_envs: int, rollouts: int) -> Rates:
+    """Return the rates in a process whose memory is kept as in that of a training."""
+    keep_freed_memory()
+    return measure(task, num_envs, rollouts)
 
 
 def _median_ratio(engine: Sequence[float], part: Sequence[float]) -> float:

@@ -2,37 +2,67 @@
 
 from __future__ import annotations
 
-import json
+import contextlib
+import multiprocessing
+import os
 import resource
-import subprocess
-import sys
+import signal
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import ParamSpec, TypeVar
 
 from mute.support.errors import MuteError
 
 __all__ = ["call_apart", "peak_memory_mb"]
 
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
 
-def call_apart(module: str, function: str, *arguments: str | float) -> Any:  # noqa: ANN401
-    """Call a function in a new process and return what it returns, as plain data.
+
+def call_apart(function: Callable[_P, _T], *arguments: _P.args, **named: _P.kwargs) -> _T:
+    """Call a function in a new process and return what it returns.
+
+    The process begins empty, with this one's environment variables. What it prints goes to the
+    standard error; it ends with this call, whatever ends that.
 
     Args:
-        module: Name of its module.
-        function: Its name there; it returns a dataclass.
-        arguments: Numbers and words.
+        function: One that a new process can import: of the top level of a module, or of the program
+            that runs.
+        arguments: What it takes; that and what it returns can be pickled.
+        named: Likewise.
 
     Raises:
-        MuteError: If the call fails; it ends with what the process said last.
+        MuteError: If the call fails, in one line.
     """
-    code = (
-        f"import dataclasses, json; from {module} import {function}; "
-        f"print(json.dumps(dataclasses.asdict({function}(*{arguments!r}))))"
-    )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    if result.returncode != 0:
-        raise MuteError(f"the measurement failed: {result.stderr.strip()[-200:]}")
-    return json.loads(result.stdout.splitlines()[-1])
+    others = multiprocessing.active_children()
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, context, initializer=_print_aside) as pool:
+        try:
+            with _without_interrupts():  # Ctrl-C ends it by way of this process
+                future = pool.submit(function, *arguments, **named)
+            return future.result()
+        except Exception as error:
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise MuteError(f"the measurement failed: {reason}") from error
+        except BaseException:
+            for child in set(multiprocessing.active_children()) - set(others):
+                child.kill()
+            raise
+
+
+def _print_aside() -> None:
+    os.dup2(2, 1)
+
+
+@contextlib.contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Ignore Ctrl-C, as processes go on to do that are started in here."""
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
 
 
 def peak_memory_mb() -> float:
