@@ -135,7 +135,7 @@ def one_process() -> dict:
 def two_ranks(one_process, tmp_path_factory) -> tuple[Path, list[dict]]:
     directory = tmp_path_factory.mktemp("ranks")
     torch.save(one_process["recorded"], directory / "recorded.pt")
-    command = ["tests/mute/ranks_at_work.py", str(directory)]
+    command = ["tests/helpers/ranks_at_work.py", str(directory)]
     processes = _start_ranks(command, command)
     errors = _finish(processes)
     assert [process.returncode for process in processes] == [0, 0], errors

@@ -12,6 +12,7 @@ from learning_helpers import differences, everything, make_cfg, make_runner
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from mute.checkpoint import CheckpointError, load_checkpoint, save_checkpoint
+from mute.evaluation.noise_probe import NoiseProbe
 from mute.learning.logger import CurveWriter
 from mute.learning.runner import MuteRunner, policy_part
 from mute.tasks import make_task
@@ -237,7 +238,7 @@ def test_noise_is_measured_at_its_interval_and_changes_nothing_else(tmp_path):
     for name, interval in (("silent", 0), ("heard", 2)):
         cfg = make_cfg(iterations=4)
         cfg.agent.noise_interval = interval
-        runner = MuteRunner("go1_mute", cfg, tmp_path / name)
+        runner = MuteRunner("go1_mute", cfg, tmp_path / name, noise_probe=NoiseProbe())
         assert runner.train()
         ends.append(everything(runner))
         levels.append([line.get("Noise/level_beta_1") for line in _curves(tmp_path / name)])
