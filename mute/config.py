@@ -172,7 +172,7 @@ class AgentCfg:
     def rsl_rl(self) -> dict[str, Any]:
         """Return the configuration that rsl_rl's runner takes."""
         network = {
-            "class_name": "mute.learning.storage:PreparedModel",
+            "class_name": "mute.learning.model:PreparedModel",
             "activation": self.activation,
             "obs_normalization": True,
         }

@@ -12,15 +12,15 @@ from typing import Literal, NamedTuple
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
-from .elu import ELU
-from .lstm import State, Weights, lstm_sequence, lstm_step
 from .reflection import Reflection, tie_layer, tie_mlp, tie_vector
 
 __all__ = ["Estimate", "Estimator", "EstimatorCfg", "State"]
 
-_ACTIVATIONS: dict[str, type[nn.Module]] = {"elu": ELU, "relu": nn.ReLU, "tanh": nn.Tanh}
+State = tuple[Tensor, Tensor]
+"""Hidden and cell state of the LSTM, each of shape (N, lstm_hidden)."""
+
+_ACTIVATIONS: dict[str, type[nn.Module]] = {"elu": nn.ELU, "relu": nn.ReLU, "tanh": nn.Tanh}
 _LOG_VAR_RANGE = (-10.0, 5.0)
 
 
@@ -116,7 +116,6 @@ class Estimator(nn.Module):
         super().__init__()
         self.height_offset, self.height_scale = height_offset, height_scale
         self.cfg = cfg = cfg if cfg is not None else EstimatorCfg()
-        # LSTMCell holds the weights; its equations are those of `networks.lstm`.
         self.lstm = nn.LSTMCell(obs_dim, cfg.lstm_hidden)
         self.base_lin_vel_head = nn.Linear(cfg.lstm_hidden, 3)
         self.heights_head = nn.Linear(cfg.lstm_hidden, num_heights)
@@ -179,7 +178,7 @@ class Estimator(nn.Module):
             obs: Observations. Shape: (N, obs_dim).
             state: Hidden and cell state. Shapes: (N, lstm_hidden).
         """
-        state = lstm_step(obs, state, self._lstm_weights())
+        state = self.lstm(obs, state)
         return self._heads(state[0]), state
 
     def unroll(
@@ -212,8 +211,12 @@ class Estimator(nn.Module):
                 f"starts must be a bool tensor of shape {tuple(obs.shape[:2])}, "
                 f"got {starts.dtype} of shape {tuple(starts.shape)}"
             )
-        hidden, cell = lstm_sequence(obs, state, starts, self._lstm_weights())
-        return self._heads(hidden, sample, generator), (hidden[-1], cell)
+        hiddens = []
+        for step_obs, start in zip(obs, starts.unsqueeze(-1), strict=True):
+            hidden, cell = (part.masked_fill(start, 0.0) for part in state)
+            state = self.lstm(step_obs, (hidden, cell))
+            hiddens.append(state[0])
+        return self._heads(torch.stack(hiddens), sample, generator), state
 
     def decode(self, latent: Tensor) -> Tensor:
         """Predict the next observation from the latent: (., latent_dim) to (., obs_dim)."""
@@ -227,27 +230,12 @@ class Estimator(nn.Module):
         """Return heights in m as the height head gives them."""
         return (heights - self.height_offset) / self.height_scale
 
-    def _lstm_weights(self) -> Weights:
-        lstm = self.lstm
-        return Weights(lstm.weight_ih, lstm.weight_hh, lstm.bias_ih + lstm.bias_hh)
-
     def _heads(
         self, hidden: Tensor, sample: bool = False, generator: torch.Generator | None = None
     ) -> Estimate:
         """Turn hidden states, shape (., lstm_hidden), into an estimate."""
-        # One product for all heads, of which the weights alone are read: each has too few outputs
-        # to keep a processor busy.
-        heads = (
-            self.heights_head,
-            self.base_lin_vel_head,
-            self.latent_mean_head,
-            self.latent_log_var_head,
-        )
-        weight = torch.cat([head.weight for head in heads])
-        outputs = functional.linear(hidden, weight, torch.cat([head.bias for head in heads]))
-        heights, base_lin_vel, mean, log_var = outputs.split(
-            [head.out_features for head in heads], dim=-1
-        )
+        heights, base_lin_vel = self.heights_head(hidden), self.base_lin_vel_head(hidden)
+        mean, log_var = self.latent_mean_head(hidden), self.latent_log_var_head(hidden)
         log_var = log_var.clamp(*_LOG_VAR_RANGE)
         latent = _sample(mean, log_var, generator) if sample else mean
         phase = torch.sigmoid(

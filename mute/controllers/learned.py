@@ -14,7 +14,7 @@ from mute.config import TaskCfg, from_plain
 from mute.envs.observations import OBS_DIM
 from mute.envs.quadruped_env import NUM_ACTIONS
 from mute.learning.estimated_env import estimate_group, make_estimator
-from mute.learning.storage import PreparedModel
+from mute.learning.model import PreparedModel
 from mute.networks.estimator import Estimate, Estimator
 
 __all__ = ["LearnedController", "Policy", "load_policy", "make_policy"]

@@ -13,8 +13,9 @@ from tensordict import TensorDict
 from mute.learning.distributed import Ranks
 from mute.learning.estimated_env import EstimatedEnv
 from mute.learning.estimator_trainer import EstimatorTrainer
+from mute.learning.model import PreparedModel
 from mute.learning.optimizer import FusedAdam
-from mute.learning.storage import PreparedModel, PreparedStorage
+from mute.learning.storage import PreparedStorage
 from mute.networks.estimator import State
 from mute.support.threads import use_learning_threads
 

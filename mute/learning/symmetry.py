@@ -12,7 +12,7 @@ import torch
 from mute.envs.observations import OBSERVATION_WIDTHS
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.scene import LEGS
-from mute.learning.storage import PreparedModel
+from mute.learning.model import PreparedModel
 from mute.networks.estimator import Estimator
 from mute.networks.reflection import Reflection
 

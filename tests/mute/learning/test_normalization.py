@@ -7,6 +7,7 @@ import torch
 from rsl_rl.modules import EmpiricalNormalization
 
 from mute.learning.normalization import RunningNormalization
+from mute.networks.reflection import Reflection
 
 WIDTHS = (3, 2)
 
@@ -24,7 +25,7 @@ def test_statistics_of_several_updates_are_those_of_rsl_rl():
         inputs = _make_inputs(num_samples, seed)
         ours.update(*inputs.split(WIDTHS, dim=1))
         theirs.update(inputs)
-    assert ours.get_buffer("count") == theirs.get_buffer("count") == 1207
+    assert ours.count == theirs.get_buffer("count") == 1207
     torch.testing.assert_close(ours.state_dict(), theirs.state_dict(), rtol=1e-4, atol=1e-6)
     inputs = _make_inputs(50, 3)
     torch.testing.assert_close(ours(inputs), theirs(inputs), rtol=1e-3, atol=1e-3)
@@ -82,12 +83,22 @@ def test_blocks_of_unequal_length_are_refused():
         RunningNormalization(2).update(torch.zeros(10, 1), torch.zeros(1, 1))
 
 
-@pytest.mark.parametrize("stop", ["eval", "until"])
-def test_what_has_stopped_learning_stays_as_it_is(stop):
-    normalization = RunningNormalization(5, until=100 if stop == "until" else None)
+def test_what_has_stopped_learning_stays_as_it_is():
+    normalization = RunningNormalization(5)
     normalization.update(_make_inputs(100, 0))
-    if stop == "eval":
-        normalization.eval()
+    normalization.eval()
     before = {name: value.clone() for name, value in normalization.state_dict().items()}
     normalization.update(_make_inputs(100, 1))
     assert all(torch.equal(before[name], now) for name, now in normalization.state_dict().items())
+
+
+def test_a_mirror_image_counts_as_much_as_what_was_seen():
+    reflection = Reflection((1, 0, 2), (1.0, 1.0, -1.0))
+    samples = torch.tensor([[1.0, 5.0, 2.0], [3.0, 5.0, 4.0]])
+    normalization = RunningNormalization(3)
+    normalization.update(samples)
+    normalization.include_mirror_image(reflection)
+    both = torch.cat((samples, reflection(samples)))
+    torch.testing.assert_close(normalization.mean, both.mean(dim=0))
+    torch.testing.assert_close(normalization.std, both.std(dim=0, correction=0))
+    assert normalization.count == 2
