@@ -121,6 +121,7 @@ class BatchSimulation:
             if key.startswith("field/"):
                 self.field(key.removeprefix("field/")).copy_(value)
         self.set_const()
+        self._warnings.zero_()  # of a past that is not this state's
         self._state[:] = integration
         self._batch.forward()
         # The solver's warm start is part of the state, and `forward` has just moved it.

@@ -119,25 +119,26 @@ class QuadrupedEnv(VecEnv):
 
         Returns:
             Observations after resets, rewards (num_envs,), dones (num_envs,), and `extras` with
-            `time_outs` (num_envs,) and `log`.
+            `time_outs` (num_envs,), where an episode was cut off by its time or by an unstable
+            simulation, and `log`.
         """
-        clip = self.cfg.action_clip
-        self.action_before_last, self.last_action = self.last_action, self.action
-        # NaN would pass a clamp and reach the engine.
-        self.action = torch.nan_to_num(actions).clamp(-clip, clip)
+        phase = self._phase()
+        self._take_action(actions)
         self._advance()
         self.step_count += 1
         self.episode_length_buf += 1
         self._read_state()
-        terminated = self._terminated()
+        self.fallen = self._falls()
         factors = self.curriculum
-        motion = self._motion()
+        motion = self._motion(phase)
         reward, shares = self.reward_sum(motion, factors.quiet, factors.lift, factors.guide)
-        time_outs = (self.episode_length_buf >= self.max_episode_length) & ~terminated
-        dones = terminated | time_outs
-        # What an unstable simulation did is not the policy's merit or fault.
+        # What an unstable simulation did is neither the policy's merit nor its fault: it gains
+        # nothing in this step, and is worth from then on what its last observation promised.
         reward = torch.where(self.unstable, 0.0, reward)
-        log = self._log(shares, factors, terminated, time_outs)
+        over = self.episode_length_buf >= self.max_episode_length
+        time_outs = (over | self.unstable) & ~self.fallen
+        dones = self.fallen | time_outs
+        log = self._log(shares, factors, dones)
         if self.autoreset and bool(dones.any()):
             self._reset(dones)
         self._resample_and_push(dones)
@@ -211,6 +212,19 @@ class QuadrupedEnv(VecEnv):
 
     # -- one step, in order ----------------------------------------------------------------------
 
+    def _phase(self) -> torch.Tensor:
+        """Return the phases that the coming step is rewarded by, of o_t. Shape: (num_envs, 4)."""
+        if self.cfg.rewards.phase_source == "estimated":
+            return self._estimated_phase
+        return self.footfalls.phase
+
+    def _take_action(self, actions: torch.Tensor) -> None:
+        clip = self.cfg.action_clip
+        self.action_before_last, self.last_action = self.last_action, self.action
+        self.invalid_action = ~actions.isfinite().all(dim=1)
+        # NaN would pass a clamp and reach the engine.
+        self.action = torch.nan_to_num(actions).clamp(-clip, clip)
+
     def _advance(self) -> None:
         """Run the physics of one control step and record the feet at every physics step."""
         simulation = self.simulation
@@ -252,7 +266,7 @@ class QuadrupedEnv(VecEnv):
         self.joint_pos = qpos[:, 7:] - self.stand
         self.joint_vel = qvel[:, 6:]
 
-    def _motion(self) -> Motion:
+    def _motion(self, phase: torch.Tensor) -> Motion:
         feet = self.footfalls
         clearance = self._clearance()
         feet.update(clearance)
@@ -260,7 +274,6 @@ class QuadrupedEnv(VecEnv):
         self.last_joint_vel = self.joint_vel.clone()
         torque = self.simulation.actuator_force
         self.power = (torque * self.joint_vel).abs().sum(dim=1)
-        estimated = self.cfg.rewards.phase_source == "estimated"
         return Motion(
             command=self.commands.command,
             base_lin_vel=self.base_lin_vel,
@@ -275,7 +288,7 @@ class QuadrupedEnv(VecEnv):
             last_action=self.last_action,
             action_before_last=self.action_before_last,
             collisions=(self._sensors.shape_contact > 0.0).sum(dim=1).float(),
-            phase=self._estimated_phase if estimated else feet.phase,
+            phase=phase,
             foot_drop_sq=feet.drop_sq,
             foot_raise_sq=feet.raise_sq,
             foot_speed_xy=self._sensors.foot_vel[:, :, :2].norm(dim=2),
@@ -292,12 +305,11 @@ class QuadrupedEnv(VecEnv):
         foot_pos = self._sensors.foot_pos
         return foot_pos[:, :, 2] - FOOT_RADIUS - self.terrain.height(foot_pos[:, :, :2])
 
-    def _terminated(self) -> torch.Tensor:
+    def _falls(self) -> torch.Tensor:
+        """Return which robots fell; those of unstable simulations stand again already."""
         upright = -self.projected_gravity[:, 2]
-        self.fallen = (self._sensors.trunk_contact > 0.0).any(dim=1) | (
-            upright < math.cos(self.cfg.max_tilt)
-        )
-        return self.fallen | self.unstable
+        down = (self._sensors.trunk_contact > 0.0).any(dim=1)
+        return (down | (upright < math.cos(self.cfg.max_tilt))) & ~self.unstable
 
     def _reset(self, mask: torch.Tensor) -> None:
         """Begin new episodes for the masked robots; no other robot is touched."""
@@ -379,13 +391,12 @@ class QuadrupedEnv(VecEnv):
         self,
         shares: dict[str, torch.Tensor],
         factors: Curriculum,
-        terminated: torch.Tensor,
-        time_outs: torch.Tensor,
+        dones: torch.Tensor,
     ) -> dict[str, torch.Tensor]:
         return {
             **{f"Reward/{name}": share for name, share in shares.items()},
             **gait_log(self.commands.command, self.base_lin_vel, self.power, self.footfalls),
-            **episode_log(terminated, time_outs, self.unstable),
+            **episode_log(dones, self.fallen, self.unstable, self.invalid_action),
             **curriculum_log(factors, self.device),
         }
 
@@ -405,8 +416,14 @@ class QuadrupedEnv(VecEnv):
         self.action, self.last_action, self.action_before_last = zeros, zeros, zeros
         self.last_joint_vel = zeros
         self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long, device=device)
-        self.unstable = torch.zeros(num_envs, dtype=torch.bool, device=device)
-        self.fallen = torch.zeros(num_envs, dtype=torch.bool, device=device)
+        nobody = torch.zeros(num_envs, dtype=torch.bool, device=device)
+        self.fallen = nobody
+        """Robots that fell in the last step. Shape: (num_envs,), bool."""
+        self.unstable = nobody
+        """Robots whose simulation blew up in it, which is no fall. Shape: (num_envs,), bool."""
+        self.invalid_action = nobody
+        """Robots whose action in it held NaN, taken for 0, or infinity, taken for the clip.
+        Shape: (num_envs,), bool."""
         self.power = torch.zeros(num_envs, device=device)
         self.step_count = 0
         self.unstable_count = 0

@@ -37,18 +37,23 @@ def gait_log(
     return log
 
 
-def episode_log(terminated: Tensor, time_outs: Tensor, unstable: Tensor) -> dict[str, Tensor]:
-    """Return how episodes ended.
+def episode_log(
+    dones: Tensor, fallen: Tensor, unstable: Tensor, invalid_action: Tensor
+) -> dict[str, Tensor]:
+    """Return how episodes ended, and how many robots went wrong. All shapes: (num_envs,), bool.
 
     Args:
-        terminated: Robots that fell or whose simulation broke. Shape: (num_envs,), bool.
-        time_outs: Robots whose time was up. Shape: (num_envs,), bool.
-        unstable: Robots whose simulation broke. Shape: (num_envs,), bool.
+        dones: Robots whose episode ended.
+        fallen: Robots that fell.
+        unstable: Robots whose simulation blew up, which is no fall.
+        invalid_action: Robots whose action held NaN or infinity.
     """
-    log = {"Episode/unstable": unstable.sum().float()}
-    finished = terminated | time_outs
-    if bool(finished.any()):
-        log["Episode/fall_rate"] = terminated.sum() / finished.sum()
+    log = {
+        "Episode/unstable": unstable.sum().float(),
+        "Episode/invalid_actions": invalid_action.sum().float(),
+    }
+    if bool(dones.any()):
+        log["Episode/fall_rate"] = fallen.sum() / dones.sum()
     return log
 
 

@@ -141,6 +141,13 @@ def _write(
     return [*files, "track.csv", *(path.name for path in maps)]
 
 
+_ENDS = {
+    "fell": "fell",
+    "unstable": "was stopped, as its simulation became unstable,",
+    "time limit": "ran out of time",
+}
+
+
 def _story(result: Walk, course: Course) -> str:
     """Return in one line how far the robot came."""
     way = f"{result.progress:.1f} m of {result.path_length:.1f} m"
@@ -149,7 +156,7 @@ def _story(result: Walk, course: Course) -> str:
     else:
         x, y = result.position
         floor = course.floor_names[int(course.floor_at(result.position))]
-        did = "fell" if result.end == "fell" else "ran out of time"
+        did = _ENDS[result.end]
         start = (
             f"{did} after {way}, at ({x:.2f}, {y:.2f}) m on {floor}; the figures are of that part"
         )

@@ -20,6 +20,8 @@ _REPORTED = (
     "stride_frequency",
     "power",
     "fall_rate",
+    "unstable",
+    "invalid_actions",
 )
 """Figures of a `Gait` that --json prints."""
 
@@ -78,6 +80,10 @@ def summary(session: Session, floor: str | None) -> dict[str, str]:
         "power": f"{gait.power:.1f} W",
         "fell": f"{100.0 * gait.fall_rate:.1f} % of the robots",
     }
+    if gait.unstable > 0:
+        figures["unstable"] = f"{gait.unstable} times, and reset: the simulation blew up"
+    if gait.invalid_actions > 0:
+        figures["invalid actions"] = f"{gait.invalid_actions}, with NaN or infinity"
     if session.listener is not None:
         levels = session.listener.levels()
         about = ["modelled", f"on {floor}" if floor else f"sounding as {session.listener.surface}"]

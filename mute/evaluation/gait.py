@@ -40,7 +40,9 @@ class Gait:
     fall_rate: float
     """Share of the robots that fell at least once."""
     unstable: int
-    """Simulations that blew up and were reset."""
+    """Times that a simulation blew up and was reset, which is no fall."""
+    invalid_actions: int
+    """Control steps of a robot whose action held NaN or infinity."""
 
     def as_dict(self) -> dict[str, float]:
         """Return the figures by name."""
@@ -55,13 +57,15 @@ class GaitMeter:
 
         Args:
             env: The environment to read after each of its steps.
-            settle_time: Time after the start of each episode that is not measured, s; falls are.
+            settle_time: Time after the start of each episode that is not measured, s; falls are,
+                and so is what went wrong.
         """
         self._env = env
         self._settle_steps = round(settle_time / env.step_dt)
         self._sums = torch.zeros(len(_SUMS), env.num_envs, dtype=torch.float64)
         self._fallen = torch.zeros(env.num_envs, dtype=torch.bool)
-        self._unstable_before = env.unstable_count
+        self._unstable = torch.zeros(env.num_envs, dtype=torch.long)
+        self._invalid_actions = torch.zeros(env.num_envs, dtype=torch.long)
         self._age = torch.zeros(env.num_envs, dtype=torch.long)
 
     def update(self, command: torch.Tensor, dones: torch.Tensor) -> None:
@@ -92,6 +96,8 @@ class GaitMeter:
         )
         self._sums += torch.where(measured, values, 0.0)
         self._fallen |= env.fallen
+        self._unstable += env.unstable
+        self._invalid_actions += env.invalid_action
         self._age.masked_fill_(dones, 0)
 
     def gait(self, chosen: torch.Tensor | None = None) -> Gait:
@@ -116,7 +122,8 @@ class GaitMeter:
             stride_frequency=_ratio(landings, steps * feet * self._env.step_dt),
             power=_ratio(total["power"], steps),
             fall_rate=float(self._fallen[chosen].double().mean()),
-            unstable=self._env.unstable_count - self._unstable_before,
+            unstable=int(self._unstable[chosen].sum()),
+            invalid_actions=int(self._invalid_actions[chosen].sum()),
         )
 
 

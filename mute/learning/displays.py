@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
@@ -25,6 +26,12 @@ _COLUMNS = {
     "Loss/estimator_phase_mae": ("phase MAE", "{:.3f}"),
 }
 """Curves that the display shows, with their captions."""
+
+_TROUBLE = {
+    "Episode/unstable": ("unstable simulations a step", "{:.3g}"),
+    "Episode/invalid_actions": ("robots a step with NaN or infinity for an action", "{:.3g}"),
+}
+"""Curves that it shows where they are not zero."""
 
 
 class LiveDisplay:
@@ -74,11 +81,7 @@ class PlainDisplay:
         self._first = iteration if self._first is None else self._first
         elapsed = time.perf_counter() - self._start
         left = elapsed / (iteration + 1 - self._first) * (total - iteration - 1)
-        figures = [
-            f"{caption} {form.format(scalars[tag])}"
-            for tag, (caption, form) in _COLUMNS.items()
-            if tag in scalars
-        ]
+        figures = [f"{caption} {figure}" for caption, figure in _shown(scalars)]
         print(
             f"{iteration + 1}/{total}", *figures, f"left {left / 60:.1f} min", sep=" | ", flush=True
         )
@@ -86,7 +89,13 @@ class PlainDisplay:
 
 def _figures(scalars: dict[str, float]) -> RenderableType:
     table = Table.grid(padding=(0, 2))
-    for tag, (caption, form) in _COLUMNS.items():
-        if tag in scalars:
-            table.add_row(caption, form.format(scalars[tag]))
+    for caption, figure in _shown(scalars):
+        table.add_row(caption, figure)
     return table
+
+
+def _shown(scalars: dict[str, float]) -> Iterator[tuple[str, str]]:
+    """Yield the caption and the figure of each curve that a display shows."""
+    for tag, (caption, form) in (_COLUMNS | _TROUBLE).items():
+        if tag in scalars and (tag in _COLUMNS or scalars[tag] != 0.0):
+            yield caption, form.format(scalars[tag])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 import torch
@@ -345,6 +346,17 @@ def test_an_action_that_is_no_number_counts_as_zero():
     assert torch.equal(rewards, expected_rewards)
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_robots_with_an_action_that_is_no_number_are_counted_in_each_step(value):
+    env = _make_env(3)
+    actions = torch.zeros(3, 12)
+    actions[0, 3] = actions[2, 0] = actions[2, 7] = value
+    assert env.step(actions)[3]["log"]["Episode/invalid_actions"].item() == 2.0
+    assert env.invalid_action.tolist() == [True, False, True]
+    assert _stand_still(env)[3]["log"]["Episode/invalid_actions"].item() == 0.0
+    assert not env.invalid_action.any()
+
+
 def test_an_infinite_action_is_clipped():
     env = _make_env(2, action_clip=1.0, **QUIET)
     observations, rewards, _, _ = env.step(torch.full((2, 12), -math.inf))
@@ -363,10 +375,13 @@ def test_an_unstable_simulation_ends_its_episode_and_spoils_nothing(
     getattr(env.simulation, name)[1, 2] = value
     _, rewards, dones, extras = env.step(_actions(3, 2))
     assert dones.tolist() == [False, True, False]
-    assert not extras["time_outs"].any()
+    # Its value goes on from the last observation, as where the time is over: it is no fall.
+    assert extras["time_outs"].tolist() == [False, True, False]
     assert rewards[1] == 0.0
     assert env.unstable_count == 1
+    assert not env.fallen.any()
     assert extras["log"]["Episode/unstable"] == 1.0
+    assert extras["log"]["Episode/fall_rate"] == 0.0
     # Neither is what the feet did meanwhile, at thousands of m/s, in the averages.
     assert all(value.abs() < 1e3 for value in extras["log"].values())
     _roll(twin, 1, first=2)
@@ -479,6 +494,23 @@ def test_the_phase_that_was_handed_over_shapes_the_reward_where_it_is_asked_for(
         rewards.append(_stand_still(env, 2)[1])
     # The feet fall: the further the estimated phase, the dearer.
     assert bool((rewards[1] < rewards[0]).all()) is differs
+
+
+def test_the_true_phase_that_a_step_is_rewarded_by_is_that_of_the_observation_acted_on():
+    only_drop: Any = dict.fromkeys(TERMS, 0.0) | {"foot_drop_velocity": -0.5}
+    rewards = RewardsCfg(**only_drop, phase_source="true")
+    env = _make_env(2, rewards=rewards, episode_length=0.24, **QUIET)
+    moved = 0
+    for step in range(20):  # across the end of an episode
+        before = env.get_observations()["privileged"][:, env.privileged_slices["phase"]]
+        beta = env.commands.beta.clone()
+        reward, dones = env.step(_actions(2, step, size=3.0))[1:3]
+        feet = env.footfalls
+        expected = -0.5 * env.step_dt * beta * (before.exp() * feet.drop_sq).sum(dim=1)
+        # Of an episode that has just ended, the feet's speeds are forgotten already.
+        torch.testing.assert_close(reward[~dones], expected[~dones])
+        moved += int(((feet.phase != before) & (feet.drop_sq > 1e-4))[~dones].sum())
+    assert moved > 20  # the phase of the next observation would have given another reward
 
 
 @pytest.mark.parametrize(

@@ -234,6 +234,27 @@ def test_a_loaded_state_continues_bit_for_bit(make_standing):
         _assert_same(_tensors(twin, index), _tensors(simulation, index))
 
 
+def test_a_state_that_is_loaded_over_a_simulation_that_blew_up_is_stable_again(
+    make_standing, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    simulation, twin = make_standing(), make_standing()
+    simulation.ctrl += 0.2
+    simulation.step(3)
+    state = simulation.state_dict()
+    simulation.qpos[0, 1], simulation.qvel[1, 2] = math.nan, 1e9
+    simulation.step(2)
+    assert simulation.unstable().all()
+    for each in (simulation, twin):
+        each.load_state_dict(state)
+    assert not simulation.unstable().any()
+    for each in (simulation, twin):
+        each.step(4)
+    assert not simulation.unstable().any()
+    for index in range(2):
+        _assert_same(_tensors(simulation, index), _tensors(twin, index))
+
+
 def test_a_saved_state_does_not_change_afterwards(make_standing):
     simulation = make_standing()
     simulation.field("body_mass")

@@ -57,14 +57,21 @@ def test_where_nobody_lands_nothing_is_said_of_landings():
 
 
 def test_falls_are_a_share_of_the_episodes_that_ended():
-    terminated = torch.tensor([True, False, False, False])
-    time_outs = torch.tensor([False, True, True, True])
-    nobody = torch.zeros(4, dtype=torch.bool)
-    assert _values(episode_log(terminated, time_outs, terminated)) == {
-        "Episode/unstable": 1.0,
+    dones = torch.tensor([True, True, True, True, False])
+    fallen = torch.tensor([True, False, False, False, False])
+    unstable = torch.tensor([False, True, True, False, False])
+    invalid_action = torch.tensor([False, True, True, False, True])
+    assert _values(episode_log(dones, fallen, unstable, invalid_action)) == {
+        "Episode/unstable": 2.0,
+        "Episode/invalid_actions": 3.0,
         "Episode/fall_rate": 0.25,
     }
-    assert _values(episode_log(nobody, nobody, nobody)) == {"Episode/unstable": 0.0}
+
+
+def test_where_no_episode_ended_nothing_is_said_of_falls():
+    nobody = torch.zeros(4, dtype=torch.bool)
+    log = _values(episode_log(nobody, nobody, nobody, nobody))
+    assert log == {"Episode/unstable": 0.0, "Episode/invalid_actions": 0.0}
 
 
 def test_every_factor_of_the_curriculum_is_told():

@@ -40,7 +40,7 @@ _SWAY_TIME = 0.5
 """Time between the positions that the distance is measured by, s: the trunk sways at every step,
 which leads nowhere."""
 
-End = Literal["arrived", "fell", "time limit"]
+End = Literal["arrived", "fell", "unstable", "time limit"]
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,8 @@ class Walk:
     """What came of a walk. Levels are NaN where it ended before the first reading."""
 
     end: End
-    """How it ended: a fall ends it, since the robot would start again at the origin."""
+    """How it ended: a fall or a simulation that blew up ends it, since the robot would start again
+    at the origin."""
     position: tuple[float, float]
     """Where it ended, world frame, m."""
     seconds: float
@@ -171,7 +172,7 @@ def follow_course(
     sources: Sequence[str] = SOURCES,
     from_energies: bool = False,
 ) -> Walk:
-    """Walk a course from its start to its end, to a fall, or to the time limit.
+    """Walk a course from its start to its end, to a fall or the like, or to the time limit.
 
     Args:
         env: What `make_walk_env` returns for the course; it is reset first.
@@ -232,7 +233,7 @@ def follow_course(
             listener.listen(dones)
             films.record()
             if bool(dones[0]):
-                end = "fell"
+                end = "fell" if bool(env.fallen[0]) else "unstable"
                 break
             places.append(_place(env))
     kept.note_clipped(listener.clipped)

@@ -20,6 +20,7 @@ from mute.acoustics.metering.sound_level_meter import measure
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.origin import sound_origin
 from mute.command_lines import evaluate
+from mute.command_lines.evaluate_walk import _story
 from mute.controllers import LearnedController, load_policy
 from mute.evaluation.course.course import Course, FloorArea
 from mute.evaluation.course.long_walk import Walk, follow_course, make_walk_env, time_limit
@@ -40,11 +41,11 @@ STRAIGHT = Course(((0.0, 0.0), (1.0, 0.0)), COURSE.floors, 0.36)
 
 
 class _Falling:
-    """Drives with a policy, and turns the robot on its back at a step."""
+    """Drives with a policy, and turns the robot on its back at a step, or does worse."""
 
-    def __init__(self, env, step):
+    def __init__(self, env, step, qpos=(0.0, 1.0, 0.0, 0.0)):
         self._learned = LearnedController(load_policy(POLICY), 1)
-        self._env, self._step = env, step
+        self._env, self._step, self._qpos = env, step, torch.tensor(qpos)
         self.num_envs = 1
 
     def reset(self, mask=None):
@@ -53,7 +54,7 @@ class _Falling:
     def act(self, observations):
         self._step -= 1
         if self._step == 0:
-            self._env.simulation.qpos[0, 3:7] = torch.tensor([0.0, 1.0, 0.0, 0.0])
+            self._env.simulation.qpos[0, 3:7] = self._qpos
         return self._learned.act(observations)
 
 
@@ -151,6 +152,16 @@ def test_a_fall_ends_the_walk_where_the_robot_fell():
     assert 0.6 < result.position[0] == pytest.approx(result.progress, abs=0.05)
     assert result.seconds == pytest.approx(120 * 0.02, abs=0.1)
     assert result.track.time[-1] <= result.seconds
+
+
+def test_a_simulation_that_blows_up_ends_the_walk_and_is_no_fall(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log of warnings into the working directory
+    env = make_walk_env(load_policy(POLICY).cfg.env, STRAIGHT, seed=1)
+    result = follow_course(env, _Falling(env, step=20, qpos=math.nan), STRAIGHT, beta=0.0)
+    assert (result.end, result.falls) == ("unstable", 0)
+    assert (result.gait.unstable, result.gait.fall_rate) == (1, 0.0)
+    assert result.seconds == pytest.approx(20 * 0.02)
+    assert _story(result, STRAIGHT).startswith("was stopped, as its simulation became unstable,")
 
 
 def test_a_fall_before_the_first_reading_has_no_level_and_no_sound(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import os
 import re
 import subprocess
@@ -20,7 +21,7 @@ from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
 from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
 from mute.checkpoint import save_checkpoint
 from mute.command_lines.play import PlayArgs, main
-from mute.command_lines.play_figures import captions, report
+from mute.command_lines.play_figures import captions, report, summary
 from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
 from mute.controllers.command import Command
 from mute.envs.quadruped_env import QuadrupedEnv
@@ -34,6 +35,7 @@ from mute.support.errors import MuteError
 REPORTED = {
     "beta", "command", "num_envs", "seconds", "speed", "velocity_error_sq", "landing_speed_mean",
     "landing_speed_rms", "apex_mean", "duty_factor", "stride_frequency", "power", "fall_rate",
+    "unstable", "invalid_actions",
 }  # fmt: skip
 HEADLESS = {
     key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")
@@ -283,6 +285,23 @@ def test_a_restart_forgets_figures_and_time_but_not_the_command():
     assert session.gait().fall_rate == 0.0
     expected = torch.tensor((0.1, 0.2, 0.3, 0.4))
     torch.testing.assert_close(session.env.commands.command[0], expected)
+
+
+def test_what_went_wrong_is_told_and_is_no_fall(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log of warnings into the working directory
+    session = _make_session()
+    session.step()
+    assert not {"unstable", "invalid actions"} & set(summary(session, None))
+    session.env.simulation.qpos[1, 0] = math.nan
+    session.step()
+    monkeypatch.setattr(session.controller, "act", lambda _: torch.full((2, 12), math.nan))
+    for _ in range(3):
+        session.step()
+    printed = report(session)
+    assert (printed["unstable"], printed["invalid_actions"], printed["fall_rate"]) == (1, 6, 0.0)
+    shown = summary(session, None)
+    assert shown["unstable"].startswith("1 times")
+    assert shown["invalid actions"].startswith("6, ")
 
 
 def test_what_was_not_measured_is_null_in_the_report_and_a_dash_on_the_screen():

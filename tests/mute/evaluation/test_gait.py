@@ -17,11 +17,12 @@ class _HandMadeEnv:
     num_envs, step_dt = 2, 0.02
 
     def __init__(self) -> None:
-        self.unstable_count = 3
         self.base_lin_vel = torch.zeros(2, 3)
         self.base_ang_vel = torch.zeros(2, 3)
         self.power = torch.zeros(2)
         self.fallen = torch.zeros(2, dtype=torch.bool)
+        self.unstable = torch.zeros(2, dtype=torch.bool)
+        self.invalid_action = torch.zeros(2, dtype=torch.bool)
         self.footfalls = SimpleNamespace(
             touchdown=torch.zeros(2, 4, dtype=torch.bool),
             landing_speed=torch.zeros(2, 4),
@@ -129,10 +130,17 @@ def test_a_fall_counts_while_settling_and_a_robot_only_once():
     assert meter.gait().fall_rate == 0.5
 
 
-def test_unstable_simulations_are_counted_from_the_meters_start():
-    env, meter = _make_meter()
-    env.unstable_count = 5
-    assert meter.gait().unstable == 2
+def test_unstable_simulations_and_invalid_actions_are_counted_every_time_and_are_no_falls():
+    env, meter = _make_meter(settle_time=1.0)
+    env.unstable = torch.tensor([True, False])
+    env.invalid_action = torch.tensor([True, True])
+    for _ in range(2):
+        meter.update(COMMAND, env.unstable)
+    env.unstable = NOBODY
+    meter.update(COMMAND, NOBODY)
+    gait, second = meter.gait(), meter.gait(torch.tensor([False, True]))
+    assert (gait.unstable, gait.invalid_actions, gait.fall_rate) == (2, 6, 0.0)
+    assert (second.unstable, second.invalid_actions) == (0, 3)
 
 
 def test_the_figures_have_the_names_that_others_print():
@@ -149,5 +157,6 @@ def test_the_figures_have_the_names_that_others_print():
         "power",
         "fall_rate",
         "unstable",
+        "invalid_actions",
     ]
     assert isinstance(meter.gait(), Gait)

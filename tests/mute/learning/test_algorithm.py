@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from learning_helpers import (
     NUM_ENVS,
@@ -72,6 +74,25 @@ def test_an_update_sees_the_batches_of_rsl_rl_with_the_inputs_ready_made(monkeyp
     monkeypatch.setattr(alg, "update", compare)
     assert runner.train()
     assert len(seen) == 12
+
+
+def test_what_follows_an_unstable_simulation_is_worth_the_value_of_the_observation_before(
+    tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log of warnings into the working directory
+    runner = make_runner(iterations=1)
+    alg, env, storage = runner.alg, runner.env, runner.alg.storage
+    with torch.inference_mode():
+        for step in range(2):
+            env.env.simulation.qpos[1, 2 * step] = math.nan
+            env.env.simulation.qvel[2, step] = 1e6
+            observations, rewards, dones, extras = env.step(alg.act(env.get_observations()))
+            alg.process_env_step(observations, rewards, dones, extras)
+            assert all(group.isfinite().all() for group in observations.values())
+    assert storage.dones[:2, 1:3].all()
+    values = storage.values[:2, 1:3]
+    assert (values != 0.0).all()
+    torch.testing.assert_close(storage.rewards[:2, 1:3], alg.gamma * values)
 
 
 def test_the_first_ratio_of_every_update_is_one(monkeypatch):
