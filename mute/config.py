@@ -10,8 +10,17 @@ import cattrs
 from mute.config_versions import upgraded
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.networks.estimator import EstimatorCfg
+from mute.support.ranges import Range, check_ranges
 
 __all__ = ["AgentCfg", "EstimationCfg", "PPOCfg", "TaskCfg", "from_plain", "to_plain"]
+
+_POSITIVE = Range(0.0, above=True)
+_WEIGHT = Range(0.0)
+_SHARE = Range(0.0, 1.0)
+_COUNT = Range(1, 10**9, whole=True)
+_PASSES = Range(1, 1000, whole=True)
+_WIDTH = Range(1, 16384, whole=True)
+"""A layer of that width has a gigabyte of weights already."""
 
 
 @dataclass
@@ -43,13 +52,16 @@ class EstimationCfg:
         Raises:
             ValueError: If one is out of its range.
         """
-        _check_from(1, self, "agent.estimation", "num_mini_batches")
-        _check_positive(self, "agent.estimation", "learning_rate", "max_grad_norm")
-        _check_from(0, self, "agent.estimation", "lambda_fwd", "lambda_phase", "lambda_kl")
-        if not 0.0 < self.robots_share <= 1.0:
-            raise ValueError(
-                f"agent.estimation.robots_share must be in (0, 1], got {self.robots_share}"
-            )
+        ranges = {
+            "learning_rate": _POSITIVE,
+            "lambda_fwd": _WEIGHT,
+            "lambda_phase": _WEIGHT,
+            "lambda_kl": _WEIGHT,
+            "robots_share": Range(0.0, 1.0, above=True),
+            "num_mini_batches": _COUNT,
+            "max_grad_norm": _POSITIVE,
+        }
+        check_ranges(self, "agent.estimation", ranges)
 
     def robots_learnt_from(self, num_envs: int) -> int:
         """Return how many of a number of robots an update learns from."""
@@ -92,13 +104,19 @@ class PPOCfg:
         Raises:
             ValueError: If one is out of its range.
         """
-        _check_from(1, self, "agent.ppo", "num_learning_epochs", "num_mini_batches")
-        _check_from(0, self, "agent.ppo", "value_loss_coef", "entropy_coef")
-        names = ("clip_param", "learning_rate", "desired_kl", "max_grad_norm")
-        _check_positive(self, "agent.ppo", *names)
-        for name in ("gamma", "lam"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ValueError(f"agent.ppo.{name} must be in [0, 1], got {getattr(self, name)}")
+        ranges = {
+            "num_learning_epochs": _PASSES,
+            "num_mini_batches": _COUNT,
+            "clip_param": _POSITIVE,
+            "gamma": _SHARE,
+            "lam": _SHARE,
+            "value_loss_coef": _WEIGHT,
+            "entropy_coef": _WEIGHT,
+            "learning_rate": _POSITIVE,
+            "desired_kl": _POSITIVE,
+            "max_grad_norm": _POSITIVE,
+        }
+        check_ranges(self, "agent.ppo", ranges)
 
 
 @dataclass
@@ -139,19 +157,26 @@ class AgentCfg:
         Raises:
             ValueError: If one is out of its range.
         """
-        _check_from(1, self, "agent", "iterations", "num_steps_per_env", "save_interval")
-        _check_from(0, self, "agent", "noise_interval")
-        _check_positive(self, "agent", "init_std")
+        ranges = {
+            "iterations": _COUNT,
+            "num_steps_per_env": Range(1, 10000, whole=True),
+            "save_interval": _COUNT,
+            "noise_interval": Range(0, 10**9, whole=True),
+            "actor_hidden": _WIDTH,
+            "critic_hidden": _WIDTH,
+            "init_std": _POSITIVE,
+            "std_range": _POSITIVE,
+        }
+        check_ranges(self, "agent", ranges)
         for name in ("actor_hidden", "critic_hidden"):
-            widths = getattr(self, name)
-            if not widths or min(widths) < 1:
-                raise ValueError(f"agent.{name} must be widths >= 1, got {widths}")
+            if not getattr(self, name):
+                raise ValueError(f"agent.{name} must be one width at least, got ()")
         if self.symmetric:
             self._check_even_widths()
         low, high = self.std_range
-        if not 0.0 < low <= high:
+        if low > high:
             raise ValueError(
-                f"agent.std_range must be (low, high) with 0 < low <= high, got {self.std_range}"
+                f"agent.std_range must be (low, high) with low <= high, got {self.std_range}"
             )
 
     def _check_even_widths(self) -> None:
@@ -208,8 +233,10 @@ class TaskCfg:
         """Check what neither part can know alone, and what the environment leaves to torch.
 
         Raises:
-            ValueError: If the seed is none that torch takes, or mini-batches would be empty.
+            ValueError: If the seed is none that torch takes, there are too many robots, or
+                mini-batches would be empty.
         """
+        check_ranges(self.env, "env", {"num_envs": Range(1, 2**20, whole=True)})
         if not 0 <= self.env.seed < 2**63:
             raise ValueError(f"env.seed must be in [0, 2^63), got {self.env.seed}")
         num_envs, agent = self.env.num_envs, self.agent
@@ -271,18 +298,6 @@ def _reason(error: BaseException, expected: type | None) -> str:
     if isinstance(error, ValueError) and expected in (None, int, bool):
         return str(error)
     return cattrs.v.format_exception(error, expected)
-
-
-def _check_from(low: int, cfg: object, place: str, *names: str) -> None:
-    for name in names:
-        if not getattr(cfg, name) >= low:
-            raise ValueError(f"{place}.{name} must be >= {low}, got {getattr(cfg, name)}")
-
-
-def _check_positive(cfg: object, place: str, *names: str) -> None:
-    for name in names:
-        if not getattr(cfg, name) > 0.0:
-            raise ValueError(f"{place}.{name} must be > 0, got {getattr(cfg, name)}")
 
 
 def _listed(value: Any) -> Any:  # noqa: ANN401

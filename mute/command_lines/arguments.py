@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import math
 import os
 import re
 import sys
@@ -16,12 +15,16 @@ import tyro
 
 from mute.config_versions import MOVED
 from mute.support.errors import MuteError
+from mute.support.ranges import Range
 
 __all__ = [
+    "LONGEST_WALK",
+    "MANY_ROBOTS",
     "Numbers",
     "Words",
     "check_betas",
     "check_distinct",
+    "check_option",
     "check_seed",
     "check_trials",
     "check_video",
@@ -62,6 +65,12 @@ Words = Annotated[
     ),
 ]
 """Names, separated by commas or blanks."""
+
+MANY_ROBOTS = Range(1, 16384, whole=True)
+"""How many robots may walk side by side."""
+
+LONGEST_WALK = 86400.0
+"""Longest time that a robot may be asked to walk, s."""
 
 _Args = TypeVar("_Args")
 _Result = TypeVar("_Result")
@@ -135,16 +144,29 @@ def resolve_device(device: str) -> str:
     return device
 
 
+def check_option(option: str, value: float, allowed: Range) -> None:
+    """Check a number.
+
+    Args:
+        option: Name of the option, without the dashes.
+        value: What was given.
+        allowed: What it may be.
+
+    Raises:
+        MuteError: If it is out of its range.
+    """
+    if not allowed.holds(value):
+        raise MuteError(f"--{option} must be {allowed}, got {value}")
+
+
 def check_trials(trials: int, seconds: float) -> None:
     """Check --trials and --seconds.
 
     Raises:
-        MuteError: If there are none, or they are too short to measure.
+        MuteError: If there are none or too many, or they are too short to measure or too long.
     """
-    if trials < 1:
-        raise MuteError(f"--trials must be >= 1, got {trials}")
-    if not 1.0 < seconds < math.inf:
-        raise MuteError(f"--seconds must be > 1, got {seconds:g}")
+    check_option("trials", trials, MANY_ROBOTS)
+    check_option("seconds", seconds, Range(1.0, LONGEST_WALK, above=True))
 
 
 def check_betas(betas: Sequence[float]) -> None:
@@ -181,8 +203,7 @@ def check_seed(seed: int) -> None:
     Raises:
         MuteError: If it is negative or takes more than 31 bits.
     """
-    if not 0 <= seed < 2**31:
-        raise MuteError(f"--seed must be at least 0 and at most {2**31 - 1}, got {seed}")
+    check_option("seed", seed, Range(0, 2**31 - 1, whole=True))
 
 
 def check_wav(path: Path | None) -> None:

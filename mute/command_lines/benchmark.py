@@ -27,7 +27,13 @@ from rich.progress import track
 from rsl_rl.algorithms import PPO
 from rsl_rl.utils import check_nan
 
-from mute.command_lines.arguments import Words, command_line, parse
+from mute.command_lines.arguments import (
+    Words,
+    check_distinct,
+    check_option,
+    command_line,
+    parse,
+)
 from mute.command_lines.benchmark_peers import peer_names, time_peer
 from mute.envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
 from mute.evaluation.tables import print_table, write_json
@@ -36,6 +42,7 @@ from mute.support.errors import MuteError
 from mute.support.memory import keep_freed_memory
 from mute.support.processes import call_apart, peak_memory_mb
 from mute.support.provenance import machine_kind
+from mute.support.ranges import Range
 from mute.support.threads import use_collection_threads, use_learning_threads
 from mute.tasks import DEFAULT_TASK, make_task
 
@@ -158,10 +165,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = parse(BenchmarkArgs, argv, "Measure the speed of training, part by part.")
     make_task(args.task)
     peers = peer_names(args.peers)
-    if not args.num_envs or min(args.num_envs) < 1:
-        raise MuteError(f"--num-envs must be numbers >= 1, got {args.num_envs}")
-    if args.rollouts < 1:
-        raise MuteError(f"--rollouts must be >= 1, got {args.rollouts}")
+    check_distinct("num-envs", args.num_envs)
+    for num_envs in args.num_envs:
+        check_option("num-envs", num_envs, Range(1, 2**20, whole=True))
+    check_option("rollouts", args.rollouts, Range(1, 10**6, whole=True))
     sizes = args.num_envs if args.json else track(args.num_envs, "environments")
     rows = [_rates_apart(args.task, num_envs, args.rollouts) for num_envs in sizes]
     peer_rows = _peer_rows(args, peers)

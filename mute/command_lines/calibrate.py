@@ -8,7 +8,6 @@ other speeds, other policies) is a prediction.
 
 from __future__ import annotations
 
-import math
 import os
 import shlex
 from collections.abc import Callable, Sequence
@@ -30,6 +29,9 @@ from mute.acoustics.metering.sound_level_meter import measure
 from mute.acoustics.recorder import Recorder
 from mute.acoustics.soundscape import Soundscape
 from mute.command_lines.arguments import (
+    LONGEST_WALK,
+    MANY_ROBOTS,
+    check_option,
     check_seed,
     command_line,
     make_directory,
@@ -44,6 +46,7 @@ from mute.evaluation.tables import print_table, write_json
 from mute.evaluation.trials import evaluation_cfg, run_trial
 from mute.support.errors import MuteError
 from mute.support.provenance import REPOSITORY, current_commit, file_sha256, machine_kind
+from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK
 
@@ -84,11 +87,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         MuteError: If an argument is bad, the policy cannot be used, or a level cannot be reached.
     """
     args = parse(CalibrationArgs, command_line() if argv is None else argv, __doc__ or "")
-    if args.trials < 1 or not 2.0 <= args.seconds < math.inf or not 0.0 < args.speed <= 1.0:
-        raise MuteError(
-            "--trials must be >= 1, --seconds >= 2 and --speed in (0, 1], "
-            f"got {args.trials}, {args.seconds:g} and {args.speed:g}"
-        )
+    check_option("trials", args.trials, MANY_ROBOTS)
+    check_option("seconds", args.seconds, Range(2.0, LONGEST_WALK))
+    check_option("speed", args.speed, Range(0.0, 1.0, above=True))
     check_seed(args.seed)
     policy = load_audible_policy(args.policy)
     make_directory(args.out.parent)

@@ -11,7 +11,13 @@ from typing import Any
 import torch
 from rich.progress import track
 
-from mute.command_lines.arguments import Numbers, check_betas, check_trials
+from mute.command_lines.arguments import (
+    Numbers,
+    check_betas,
+    check_option,
+    check_seed,
+    check_trials,
+)
 from mute.controllers import LearnedController, load_policy
 from mute.controllers.learned import Policy
 from mute.envs.commands import BETA, CommandSampler
@@ -21,8 +27,8 @@ from mute.evaluation.matched_speed import sweep_beta_at_speed
 from mute.evaluation.progress import Milestone, checkpoints_of, training_minutes, walks
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.trials import evaluation_cfg, run_trial
-from mute.support.errors import MuteError
 from mute.support.provenance import REPOSITORY, machine_kind
+from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK
 
@@ -74,6 +80,7 @@ class ProgressArgs:
 def progress(args: ProgressArgs) -> None:
     """Measure checkpoints until one walks."""
     check_trials(args.trials, args.seconds)
+    check_seed(args.seed)
     torch.set_num_threads(1)  # the physics engine has the cores
     rows: list[dict[str, Any]] = []
     for path in track(checkpoints_of(args.run), "checkpoints"):
@@ -164,6 +171,6 @@ def _draw_commands(env: QuadrupedEnv, seed: int) -> CommandSampler:
 
 def _check(args: GaitArgs) -> None:
     check_trials(args.trials, args.seconds)
+    check_seed(args.seed)
     check_betas(args.beta)
-    if not 0.0 < args.speed <= 1.0:
-        raise MuteError(f"--speed must be in (0, 1], got {args.speed:g}")
+    check_option("speed", args.speed, Range(0.0, 1.0, above=True))

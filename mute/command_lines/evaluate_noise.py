@@ -21,6 +21,7 @@ from mute.command_lines.arguments import (
     Words,
     check_betas,
     check_distinct,
+    check_option,
     check_seed,
     check_trials,
     check_video,
@@ -41,6 +42,7 @@ from mute.evaluation.noise_levels import SETTLE_TIME, NoiseRow, NoiseSetting, me
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.rendering.recordings import Recordings
 from mute.support.errors import MuteError
+from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK
 
@@ -320,8 +322,7 @@ def _check(
         if surface not in FLOORS:
             raise MuteError(f"--surface must be of {', '.join(FLOORS)}, got {surface!r}")
     for speed in speeds:
-        if not 0.0 < speed <= 2.0:
-            raise MuteError(f"--speed must be in (0, 2], got {speed:g}")
+        check_option("speed", speed, Range(0.0, 2.0, above=True))
     settings = len(betas) * len(speeds)
     if settings * args.trials > _MAX_ROBOTS:
         raise MuteError(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import json
-import math
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -21,6 +20,9 @@ from mute.acoustics.live_listener import LiveListener
 from mute.acoustics.soundscape import SOURCES
 from mute.checkpoint import latest_checkpoint
 from mute.command_lines.arguments import (
+    LONGEST_WALK,
+    MANY_ROBOTS,
+    check_option,
     check_seed,
     check_video,
     check_wav,
@@ -48,6 +50,7 @@ from mute.rendering.backend import has_display, why_no_window
 from mute.rendering.sound_track import temporary_sound
 from mute.rendering.video import Video
 from mute.support.errors import EXIT_INTERRUPTED, MuteError
+from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
 from mute.support.threads import use_collection_threads
 from mute.tasks import DEFAULT_TASK, make_task
@@ -55,8 +58,6 @@ from mute.tasks import DEFAULT_TASK, make_task
 __all__ = ["PlayArgs", "main"]
 
 _DEFAULT_SECONDS = 20.0
-_MAX_SECONDS = 86400.0
-_MAX_ENVS = 16384
 _SETTLE_TIME = 1.0
 """Time after the start that the summary leaves out, s; half of a shorter walk."""
 _SURFACE = "wood"
@@ -116,10 +117,10 @@ class PlayArgs:
             MuteError: If a value is out of its range.
         """
         for name, (low, high) in COMMAND_LIMITS.items():
-            _require(name, getattr(self, name), low, high)
+            check_option(name, getattr(self, name), Range(low, high))
         if self.seconds is not None:
-            _require("seconds", self.seconds, 0.0, _MAX_SECONDS, above=True)
-        _require("num-envs", self.num_envs, 1, _MAX_ENVS)
+            check_option("seconds", self.seconds, Range(0.0, LONGEST_WALK, above=True))
+        check_option("num-envs", self.num_envs, MANY_ROBOTS)
         check_seed(self.seed)
         if self.surface is not None and self.surface not in FLOORS:
             allowed = ", ".join(FLOORS)
@@ -226,7 +227,7 @@ def _make_session(args: PlayArgs, endless: bool) -> Session:
     policy = load_policy(_policy_path(args))
     if args.task is not None and policy.task != args.task:
         raise MuteError(f"{_policy_path(args)} is of task {policy.task!r}, not {args.task!r}")
-    seconds = _MAX_SECONDS if endless else args.seconds or _DEFAULT_SECONDS
+    seconds = LONGEST_WALK if endless else args.seconds or _DEFAULT_SECONDS
     settle_time = min(_SETTLE_TIME, 0.5 * seconds)
     env = _make_env(args, policy, seconds)
     listener = _make_listener(args, env, settle_time)
@@ -365,10 +366,3 @@ def _print_summary(session: Session, floor: str | None) -> None:
     print(f"\nover {session.seconds:.1f} s, {robots} robot{'s' * (robots > 1)}:")
     for name, text in summary(session, floor).items():
         print(f"  {name:20}{text}")
-
-
-def _require(name: str, value: float, low: float, high: float, above: bool = False) -> None:
-    """Refuse a value outside [low, high], or outside (low, high] where `above`."""
-    if not (math.isfinite(value) and low <= value <= high) or (above and value == low):
-        lowest = f"above {low:g}" if above else f"at least {low:g}"
-        raise MuteError(f"--{name} must be {lowest} and at most {high:g}, got {value:g}")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+import typing
 
 import pytest
 import yaml
@@ -59,7 +61,7 @@ def test_plain_data_shares_nothing_with_the_configuration():
         ({"env": {"rewards": {"k": 2.0}}}, ["rewards.k", "2.0"]),
         ({"env": 3}, ["env"]),
         ({"agent": {"ppo": {"schedule": "cosine"}}}, ["agent.ppo.schedule", "cosine"]),
-        ({"agent": {"iterations": 0}}, ["agent.iterations must be >= 1, got 0"]),
+        ({"agent": {"iterations": 0}}, ["agent.iterations must be an integer >= 1", "got 0"]),
         ([], ["list"]),
         (None, ["NoneType"]),
     ],
@@ -105,6 +107,66 @@ def test_a_bad_value_is_refused_with_the_fields_name_and_the_value(cls, field, v
         dataclasses.replace(cls(), **{field: value})
     assert name in str(caught.value)
     assert str(value) in str(caught.value)
+
+
+_PLACES = {
+    AgentCfg: "agent",
+    PPOCfg: "agent.ppo",
+    EstimationCfg: "agent.estimation",
+}
+
+
+def _holds_numbers(hint: object) -> bool:
+    return hint in (int, float) or any(map(_holds_numbers, typing.get_args(hint)))
+
+
+def _fields_with_numbers() -> list[tuple[type, str]]:
+    """Return every field of the agent that holds numbers."""
+    return [
+        (cls, name)
+        for cls in _PLACES
+        for name, hint in typing.get_type_hints(cls).items()
+        if _holds_numbers(hint)
+    ]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -1])
+@pytest.mark.parametrize(
+    ("cls", "name"), _fields_with_numbers(), ids=lambda value: getattr(value, "__name__", value)
+)
+def test_no_field_of_the_agent_takes_what_is_no_number_or_below_zero(cls, name, value):
+    default = getattr(cls(), name)
+    if not isinstance(default, tuple):
+        changed = [value]
+    else:
+        changed = [
+            (*default[:index], value, *default[index + 1 :]) for index in range(len(default))
+        ]
+    for wrong in changed:
+        with pytest.raises(ValueError) as caught:
+            dataclasses.replace(cls(), **{name: wrong})
+        message = str(caught.value)
+        assert f"{_PLACES[cls]}.{name} must be" in message
+        assert str(wrong) in message
+        assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("cls", "name"), _fields_with_numbers(), ids=lambda value: getattr(value, "__name__", value)
+)
+def test_every_count_of_the_agent_has_an_upper_end(cls, name):
+    default = getattr(cls(), name)
+    if isinstance(default, float) or name == "std_range":
+        pytest.skip("a float may be as large as it can be")
+    wrong = (10**40,) if isinstance(default, tuple) else 10**40
+    with pytest.raises(ValueError, match=rf"{_PLACES[cls]}\.{name} must be .* and <= \d+, got"):
+        dataclasses.replace(cls(), **{name: wrong})
+
+
+def test_the_agents_fields_with_numbers_are_all_found():
+    names = {name for _, name in _fields_with_numbers()}
+    assert len(_fields_with_numbers()) == 8 + 10 + 7
+    assert {"actor_hidden", "std_range", "learning_rate", "lambda_kl"} <= names
 
 
 @pytest.mark.parametrize("seed", [-1, 2**63])

@@ -150,7 +150,7 @@ def test_the_wav_file_has_the_whole_walk_and_is_louder_than_the_fan(heard):
 def test_a_bad_beta_is_one_line_and_status_2():
     run = _play("--beta", "1.2")
     assert run.returncode == 2
-    assert run.stderr == "error: --beta must be at least 0 and at most 1, got 1.2\n"
+    assert run.stderr == "error: --beta must be >= 0 and <= 1, got 1.2\n"
     assert run.stdout == ""
 
 
@@ -160,13 +160,13 @@ def test_a_bad_beta_is_one_line_and_status_2():
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--beta", "-0.1"), "--beta must be at least 0 and at most 1, got -0.1"),
+        (("--beta", "-0.1"), "--beta must be >= 0 and <= 1, got -0.1"),
         (("--beta", "nan"), "--beta must be .* got nan"),
-        (("--vx", "2.5"), "--vx must be at least -2 and at most 2, got 2.5"),
+        (("--vx", "2.5"), "--vx must be >= -2 and <= 2, got 2.5"),
         (("--wz", "inf"), "--wz must be .* got inf"),
-        (("--seconds", "0"), "--seconds must be above 0 .* got 0"),
-        (("--num-envs", "-3"), "--num-envs must be at least 1 .* got -3"),
-        (("--seed", "-1"), "--seed must be at least 0 .* got -1"),
+        (("--seconds", "0"), "--seconds must be > 0 .* got 0"),
+        (("--num-envs", "-3"), "--num-envs must be an integer >= 1 .* got -3"),
+        (("--seed", "-1"), "--seed must be an integer >= 0 .* got -1"),
         (("--task", "go2"), "--task must be one of go1_mute, .* got 'go2'"),
         (("--surface", "ice"), "--surface must be one of wood, carpet, .* got 'ice'"),
         (("--wav", "walk.mp3"), "--wav must name a .wav file, got 'walk.mp3'"),
