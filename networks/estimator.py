@@ -13,6 +13,8 @@ from typing import Literal, NamedTuple
 import torch
 from torch import Tensor, nn
 
+from mute.support.ranges import Range, check_ranges
+
 from .reflection import Reflection, tie_layer, tie_mlp, tie_vector
 
 __all__ = ["Estimate", "Estimator", "EstimatorCfg", "State"]
@@ -49,14 +51,12 @@ class EstimatorCfg:
         Raises:
             ValueError: If a size is not positive, or the activation is unknown.
         """
-        sizes = {"lstm_hidden": (self.lstm_hidden,), "latent_dim": (self.latent_dim,)}
-        sizes |= {"decoder_hidden": self.decoder_hidden, "phase_hidden": self.phase_hidden}
-        for name, widths in sizes.items():
-            if any(width < 1 for width in widths):
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        width = Range(1, 16384, whole=True)
+        names = ("lstm_hidden", "latent_dim", "decoder_hidden", "phase_hidden")
+        check_ranges(self, "network", dict.fromkeys(names, width))
         if self.activation not in _ACTIVATIONS:
             raise ValueError(
-                f"activation must be one of {list(_ACTIVATIONS)}, got {self.activation!r}"
+                f"network.activation must be one of {list(_ACTIVATIONS)}, got {self.activation!r}"
             )
 
 

@@ -11,6 +11,7 @@ import yaml
 
 from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg, from_plain, to_plain
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.networks.estimator import EstimatorCfg
 from mute.tasks import make_task, task_names
 
 
@@ -113,6 +114,7 @@ _PLACES = {
     AgentCfg: "agent",
     PPOCfg: "agent.ppo",
     EstimationCfg: "agent.estimation",
+    EstimatorCfg: "network",
 }
 
 
@@ -165,7 +167,7 @@ def test_every_count_of_the_agent_has_an_upper_end(cls, name):
 
 def test_the_agents_fields_with_numbers_are_all_found():
     names = {name for _, name in _fields_with_numbers()}
-    assert len(_fields_with_numbers()) == 8 + 10 + 7
+    assert len(_fields_with_numbers()) == 8 + 10 + 7 + 4
     assert {"actor_hidden", "std_range", "learning_rate", "lambda_kl"} <= names
 
 
