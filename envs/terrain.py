@@ -30,8 +30,8 @@ class HeightMapCfg:
         """Check the lengths.
 
         Raises:
-            ValueError: If spacing or scale is not positive, an extent is negative, or one of them
-                is not finite.
+            ValueError: If spacing or scale is not positive, an extent is negative or no multiple of
+                the spacing, or one of them is not finite.
         """
         for name in ("spacing", "scale"):
             value = getattr(self, name)
@@ -43,6 +43,12 @@ class HeightMapCfg:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"height_map.{name} must be >= 0 and finite, got {value}")
+            intervals = value / self.spacing
+            if abs(intervals - round(intervals)) > 1e-6:
+                raise ValueError(
+                    f"height_map.{name} must be a multiple of height_map.spacing,"
+                    f" {self.spacing}, got {value}"
+                )
 
     def grid(self, device: torch.device | str = "cpu") -> torch.Tensor:
         """Return the grid points in the heading frame, m. Shape: (num_points, 2)."""
@@ -101,5 +107,5 @@ class FlatTerrain(Terrain):
 
 
 def _centred(extent: float, spacing: float, device: torch.device | str) -> torch.Tensor:
-    half = round(extent / spacing / 2)
-    return torch.arange(-half, half + 1, device=device) * spacing
+    intervals = round(extent / spacing)
+    return (torch.arange(intervals + 1, device=device) - 0.5 * intervals) * spacing

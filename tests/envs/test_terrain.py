@@ -62,6 +62,31 @@ def test_heights_are_normalised_by_offset_and_scale_and_come_back():
     torch.testing.assert_close(cfg.metres(cfg.normalised(heights)), heights)
 
 
+@pytest.mark.parametrize(
+    ("width", "spacing", "across"),
+    [
+        (0.45, 0.15, (-0.225, -0.075, 0.075, 0.225)),
+        (0.15, 0.15, (-0.075, 0.075)),
+        (0.6, 0.2, (-0.3, -0.1, 0.1, 0.3)),
+        (0.3, 0.1, (-0.15, -0.05, 0.05, 0.15)),  # 0.3 / 0.1 is not 3 in floating point
+    ],
+)
+def test_a_grid_has_the_extent_that_is_asked_for_also_with_no_point_in_its_middle(
+    width, spacing, across
+):
+    grid = HeightMapCfg(length=0.0, width=width, spacing=spacing).grid()
+    torch.testing.assert_close(grid[:, 1], torch.tensor(across))
+    along = HeightMapCfg(length=width, width=0.0, spacing=spacing).grid()
+    torch.testing.assert_close(along[:, 0], torch.tensor(across))
+
+
+@pytest.mark.parametrize(("field", "value"), [("width", 0.5), ("length", 0.7), ("width", 0.07)])
+def test_an_extent_that_is_no_multiple_of_the_spacing_is_refused(field, value):
+    message = rf"height_map\.{field} must be a multiple of height_map\.spacing, 0\.15, got {value}"
+    with pytest.raises(ValueError, match=message):
+        HeightMapCfg(**{field: value})
+
+
 def test_a_grid_without_extent_is_the_point_under_the_trunk():
     assert torch.equal(HeightMapCfg(length=0.0, width=0.0).grid(), torch.zeros(1, 2))
 

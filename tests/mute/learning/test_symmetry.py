@@ -72,17 +72,19 @@ def test_a_mirrored_robot_sees_the_mirror_image():
 
 
 @pytest.mark.parametrize(
-    "cfg", [HeightMapCfg(), HeightMapCfg(1.0, 0.45), HeightMapCfg(spacing=0.03)]
+    "cfg", [HeightMapCfg(), HeightMapCfg(1.05, 0.45), HeightMapCfg(spacing=0.03)]
 )
 def test_a_height_is_mirrored_to_the_point_on_the_other_side(cfg):
     precision = torch.get_float32_matmul_precision()
     torch.set_float32_matmul_precision("medium")
     try:
         grid = cfg.grid()
-        mirrored = grid[list(heights(grid).index)]
+        index = heights(grid).index
+        mirrored = grid[list(index)]
     finally:
         torch.set_float32_matmul_precision(precision)
     torch.testing.assert_close(mirrored, grid * torch.tensor([1.0, -1.0]))
+    assert [index[other] for other in index] == list(range(len(grid)))
 
 
 def test_the_critics_physics_are_mirrored_by_the_side_of_the_centre_of_mass():
