@@ -65,8 +65,9 @@ class QuadrupedEnv(VecEnv):
         self.autoreset = True
         """Whether `step` resets finished robots; without, it returns what they saw last, and the
         caller resets them with `reset`."""
-        self.on_physics_step: Callable[[], None] | None = None
-        """Called after every physics step, with the engine's state of that step to be read."""
+        self.physics_listeners: list[Callable[[], None]] = []
+        """Called in turn after every physics step, with the engine's state of that step to be read.
+        Whoever listens appends itself, and removes itself in the end."""
         self.step_dt = cfg.step_dt
         self.max_episode_length = math.ceil(cfg.episode_length / cfg.step_dt)
         self.model = build_scene(cfg.scene, foot_samples=cfg.decimation)
@@ -229,12 +230,13 @@ class QuadrupedEnv(VecEnv):
         """Run the physics of one control step and record the feet at every physics step."""
         simulation = self.simulation
         torch.add(self.stand, self.action, alpha=self.cfg.action_scale, out=simulation.ctrl)
-        if self.on_physics_step is None:
+        if not self.physics_listeners:
             simulation.step(self.cfg.decimation)
         else:
             for _ in range(self.cfg.decimation):
                 simulation.step()
-                self.on_physics_step()
+                for listener in self.physics_listeners:
+                    listener()
         self.footfalls.record(self._sensors.foot_vel_z_history, self._sensors.foot_contact_history)
         self.unstable = simulation.unstable()
         if bool(self.unstable.any()):

@@ -42,7 +42,7 @@ def _walk(timestep: float, beta: float) -> dict[str, float]:
         forces.append(simulation.sensordata[:, columns].reshape(-1, 4, 3)[..., 2].abs())
         power.append((simulation.actuator_force * simulation.qvel[:, 6:]).abs().sum(dim=1).mean())
 
-    env.on_physics_step = record
+    env.physics_listeners.append(record)
     command = torch.tensor([0.5, 0.0, 0.0, beta])
     steps = round(SECONDS / env.step_dt)
     gait = run_trial(env, LearnedController(policy, ROBOTS), command, steps).gait()

@@ -6,6 +6,7 @@ copies while the physics runs; a block is worked out when it is taken.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 
 import mujoco
@@ -45,7 +46,7 @@ class Recorder:
         """Begin to record.
 
         Args:
-            env: The environment; its `on_physics_step` is taken.
+            env: The environment, which others may record as well.
             floor_at: Index of the floor under world positions of shape (..., 2) in m, as an array
                 of shape (...), or one index for everywhere.
             robots: Which robots to record, in blocks that count from the first of them; None for
@@ -80,11 +81,12 @@ class Recorder:
         self._stood = np.ones((len(self._last_qpos), feet), dtype=bool)
         self._restarts: list[tuple[int, NDArray[np.bool_]]] = []
         self._steps = 0
-        env.on_physics_step = self._record
+        env.physics_listeners.append(self._record)
 
     def close(self) -> None:
-        """Stop recording."""
-        self._env.on_physics_step = None
+        """Stop recording, if that has not been done."""
+        with contextlib.suppress(ValueError):
+            self._env.physics_listeners.remove(self._record)
 
     def restart(self, robots: NDArray[np.bool_], unstable: NDArray[np.bool_] | None = None) -> None:
         """Take note that robots begin anew: a foot's first contact from now on is no impact.

@@ -79,14 +79,15 @@ def impacts() -> Impacts:
     model = _make_model()
     simulation = BatchSimulation(model, len(HEIGHTS), num_threads=1)
     scene = SimpleNamespace(foot_forces=True, timestep=TIMESTEP)
-    env = SimpleNamespace(cfg=SimpleNamespace(scene=scene), model=model, simulation=simulation)
+    cfg = SimpleNamespace(scene=scene)
+    env = SimpleNamespace(cfg=cfg, model=model, simulation=simulation, physics_listeners=[])
     simulation.qpos[:, 7:] = simulation.qpos.new_tensor(HEIGHTS)
     simulation.forward()
     # Floor 1 lies under the front feet, floor 0 under the others.
     recorder = Recorder(cast(QuadrupedEnv, env), lambda xy: (xy[..., 0] > 0.0).astype(np.int8))
     for _ in range(400):
         simulation.step()
-        env.on_physics_step()
+        env.physics_listeners[0]()
     return recorder.take().impacts
 
 

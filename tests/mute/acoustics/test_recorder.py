@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import torch
 
+from mute.acoustics.contacts import ContactBlock
 from mute.acoustics.recorder import Recorder, effective_mass
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
@@ -61,14 +62,8 @@ def test_a_dropped_robots_front_feet_land_at_the_speed_of_free_fall(height):
 def test_a_landing_has_the_effective_mass_of_the_pose_in_which_the_foot_lands():
     env = _make_env()
     recorder = Recorder(env)
-    record, poses = env.on_physics_step, []
-    assert record is not None
-
-    def record_poses() -> None:
-        record()
-        poses.append(env.simulation.qpos.numpy().astype(float))
-
-    env.on_physics_step = record_poses
+    poses = []
+    env.physics_listeners.append(lambda: poses.append(env.simulation.qpos.numpy().astype(float)))
     env.simulation.qpos[:, 2] += 0.1
     _walk(env, 9)
     impacts = recorder.take().impacts
@@ -162,6 +157,32 @@ def test_blocks_tile_the_recording_whatever_their_length():
     assert [block.start for block in many] == pytest.approx([0.0, 0.02, 0.08])
     assert many[-1].end == pytest.approx(one.end) == pytest.approx(0.18)
     assert len(one.impacts) >= 4
+
+
+def _assert_same_block(one: ContactBlock, other: ContactBlock) -> None:
+    for name in ("friction_power", "foot_pos", "joint_power", "joint_speed", "trunk_pos"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    for name in ("time", "robot", "foot", "speed", "mass", "position"):
+        np.testing.assert_array_equal(getattr(one.impacts, name), getattr(other.impacts, name))
+
+
+def test_several_recorders_of_an_environment_hear_each_what_one_alone_would():
+    env, twin = _make_env(), _make_env()
+    first, second, alone = Recorder(env), Recorder(env), Recorder(twin)
+    for each in (env, twin):
+        each.simulation.qpos[:, 2] += 0.1
+        _walk(each, 9)
+    block = alone.take()
+    assert len(block.impacts) >= 8
+    for recorder in (first, second):
+        _assert_same_block(recorder.take(), block)
+    second.close()
+    second.close()  # once more is no mistake, and ends no other
+    for each in (env, twin):
+        _walk(each, 2)
+    _assert_same_block(first.take(), alone.take())
+    with pytest.raises(ValueError, match="no physics step"):
+        second.take()
 
 
 def test_one_robot_alone_is_recorded_as_among_the_others():
