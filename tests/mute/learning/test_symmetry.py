@@ -181,7 +181,9 @@ def test_the_first_rollout_of_a_symmetric_run_reproduces_its_estimates():
     runner = _make_symmetric_runner(iterations=1)
     estimator, first = runner.env.estimator, runner.env.get_observations()
     estimate, _ = estimator.step(first["policy"], runner.env.state_before)
-    assert torch.equal(estimate_group(estimate, estimator, with_phase=True), first["estimate"])
+    group = estimate_group(estimate, estimator, with_phase=True)
+    # Estimated with gradients now and without them then: equal up to rounding.
+    torch.testing.assert_close(group, first["estimate"], rtol=0.0, atol=1e-5)
 
 
 @pytest.mark.parametrize(
