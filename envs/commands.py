@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import torch
+
+from mute.support.ranges import Range, check_ordered, check_ranges
 
 __all__ = ["CommandSampler", "CommandsCfg"]
 
@@ -39,31 +40,22 @@ class CommandsCfg:
         """Check the ranges.
 
         Raises:
-            ValueError: If a range is empty, or a share or a time is out of bounds.
+            ValueError: If a range is empty, or a number is out of its own.
         """
-        for name in ("lin_vel_x", "lin_vel_y", "ang_vel_z", "beta"):
-            low, high = getattr(self, name)
-            if not -math.inf < low <= high < math.inf:
-                raise ValueError(
-                    f"commands.{name} must be finite (low, high) with low <= high, "
-                    f"got {(low, high)}"
-                )
-        if not 0.0 <= self.beta[0] <= self.beta[1] <= 1.0:
-            raise ValueError(f"commands.beta must lie in [0, 1], got {self.beta}")
-        if not 0.0 <= self.standing_fraction <= 1.0:
-            raise ValueError(
-                f"commands.standing_fraction must be in [0, 1], got {self.standing_fraction}"
-            )
-        if not 0.0 <= self.initial_share <= 1.0:
-            raise ValueError(f"commands.initial_share must be in [0, 1], got {self.initial_share}")
-        if not 0.0 <= self.ramp[0] <= self.ramp[1] < math.inf:
-            raise ValueError(
-                f"commands.ramp must be (start, end) with 0 <= start <= end, got {self.ramp}"
-            )
-        if not 0.0 < self.resampling_time < math.inf:
-            raise ValueError(
-                f"commands.resampling_time must be > 0 and finite, got {self.resampling_time}"
-            )
+        check_ranges(self, "env.commands", _RANGES)
+        check_ordered(self, "env.commands", "lin_vel_x", "lin_vel_y", "ang_vel_z", "beta", "ramp")
+
+
+_RANGES = {
+    "lin_vel_x": Range(-100.0, 100.0),
+    "lin_vel_y": Range(-100.0, 100.0),
+    "ang_vel_z": Range(-100.0, 100.0),
+    "beta": Range(0.0, 1.0),
+    "standing_fraction": Range(0.0, 1.0),
+    "resampling_time": Range(0.0, 1e12, above=True),
+    "initial_share": Range(0.0, 1.0),
+    "ramp": Range(0.0, 1e12),
+}
 
 
 class CommandSampler:

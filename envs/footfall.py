@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import torch
 
+from mute.support.ranges import Range, check_ranges
+
 from .phase import CausalContacts
 
 __all__ = ["FootfallCfg", "Footfalls"]
@@ -33,11 +35,11 @@ class FootfallCfg:
         """Check the times.
 
         Raises:
-            ValueError: If a time is not positive.
+            ValueError: If one is out of its range.
         """
-        for name in ("min_segment", "max_segment", "landing_window"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"footfall.{name} must be > 0, got {getattr(self, name)}")
+        time = Range(0.0, 10.0, above=True)
+        names = ("min_segment", "max_segment", "landing_window")
+        check_ranges(self, "env.footfall", dict.fromkeys(names, time))
 
 
 class Footfalls:

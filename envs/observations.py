@@ -5,10 +5,11 @@ The layouts are data: other code finds a part of a group by its name, never by a
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 import torch
+
+from mute.support.ranges import Range, check_number
 
 __all__ = [
     "OBSERVATION_WIDTHS",
@@ -63,26 +64,24 @@ class ObservationsCfg:
         """Check the names and the values.
 
         Raises:
-            ValueError: If a scale is missing, a part is unknown, a value is not finite, or noise is
-                negative.
+            ValueError: If a scale is missing, a part is unknown, or a number is out of its range.
         """
         if set(self.scales) != set(OBSERVATION_WIDTHS):
             raise ValueError(
-                f"observations.scales must name {list(OBSERVATION_WIDTHS)}, got {list(self.scales)}"
+                f"env.observations.scales must name {list(OBSERVATION_WIDTHS)},"
+                f" got {list(self.scales)}"
             )
         unknown = set(self.noise) - set(OBSERVATION_WIDTHS)
         if unknown:
             raise ValueError(
-                f"observations.noise must name parts of {list(OBSERVATION_WIDTHS)}, "
+                f"env.observations.noise must name parts of {list(OBSERVATION_WIDTHS)}, "
                 f"got {sorted(unknown)}"
             )
         for name, value in self.scales.items():
-            if not math.isfinite(value):
-                raise ValueError(f"observations.scales.{name} must be finite, got {value}")
-        noise = {f"noise.{name}": value for name, value in self.noise.items()}
-        for name, value in (noise | {"noise_level": self.noise_level}).items():
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"observations.{name} must be >= 0 and finite, got {value}")
+            check_number(f"env.observations.scales.{name}", value, Range(-1e6, 1e6))
+        for name, value in self.noise.items():
+            check_number(f"env.observations.noise.{name}", value, Range(0.0, 1e6))
+        check_number("env.observations.noise_level", self.noise_level, Range(0.0, 1e6))
 
 
 def slices(widths: dict[str, int]) -> dict[str, slice]:

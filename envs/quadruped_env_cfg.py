@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import get_args
 
+from mute.support.ranges import Range, check_ranges
+
 from .commands import CommandsCfg
 from .footfall import FootfallCfg
 from .observations import ObservationsCfg
@@ -72,17 +74,23 @@ class QuadrupedEnvCfg:
             raise ValueError(
                 f"env.engine must be one of {', '.join(get_args(Engine))}, got {self.engine!r}"
             )
-        for name in ("num_envs", "decimation"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"env.{name} must be >= 1, got {getattr(self, name)}")
-        for name in ("episode_length", "action_scale", "action_clip", "max_tilt"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"env.{name} must be > 0 and finite, got {getattr(self, name)}")
-        for name in ("initial_joint_noise", "initial_velocity"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"env.{name} must be >= 0 and finite, got {getattr(self, name)}")
+        check_ranges(self, "env", _RANGES)
 
     @property
     def step_dt(self) -> float:
         """Control period, s."""
         return self.scene.timestep * self.decimation
+
+
+_RANGES = {
+    "num_envs": Range(1, 2**20, whole=True),
+    "seed": Range(0, 2**63 - 1, whole=True),  # what torch takes
+    "num_threads": Range(0, 4096, whole=True),
+    "decimation": Range(1, 1000, whole=True),
+    "episode_length": Range(0.0, 1e9, above=True),
+    "action_scale": Range(0.0, 100.0, above=True),
+    "action_clip": Range(0.0, 1e6, above=True),
+    "max_tilt": Range(0.0, math.pi, above=True),
+    "initial_joint_noise": Range(0.0, math.pi),
+    "initial_velocity": Range(0.0, 100.0),
+}

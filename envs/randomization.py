@@ -6,10 +6,11 @@ stay a thousand robots for a whole training.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import torch
+
+from mute.support.ranges import Range, check_ordered, check_ranges
 
 from .simulation import Simulation
 
@@ -44,27 +45,22 @@ class RandomizationCfg:
         """Check the ranges.
 
         Raises:
-            ValueError: If a range is empty or unphysical.
+            ValueError: If a range is empty, or a number is out of its own.
         """
-        for name in ("friction", "added_mass", "com_offset", "gain_scale", "friction_loss"):
-            low, high = getattr(self, name)
-            if not -math.inf < low <= high < math.inf:
-                raise ValueError(
-                    f"randomization.{name} must be (low, high) with low <= high, both finite, "
-                    f"got {(low, high)}"
-                )
-        for name in ("friction", "gain_scale", "friction_loss"):
-            if getattr(self, name)[0] < 0.0:
-                raise ValueError(f"randomization.{name} must be >= 0, got {getattr(self, name)}")
-        if self.added_mass[0] <= -_TRUNK_MASS:
-            raise ValueError(
-                f"randomization.added_mass must be > {-_TRUNK_MASS}, or nothing is left of the "
-                f"trunk, got {self.added_mass}"
-            )
-        for name in ("push_interval", "push_velocity"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"randomization.{name} must be >= 0 and finite, got {value}")
+        check_ranges(self, "env.randomization", _RANGES)
+        pairs = ("friction", "added_mass", "com_offset", "gain_scale", "friction_loss")
+        check_ordered(self, "env.randomization", *pairs)
+
+
+_RANGES = {
+    "friction": Range(0.0, 10.0),
+    "added_mass": Range(-_TRUNK_MASS, 1000.0, above=True),  # or nothing is left of the trunk
+    "com_offset": Range(-1.0, 1.0),
+    "gain_scale": Range(0.0, 100.0),
+    "friction_loss": Range(0.0, 1000.0),
+    "push_interval": Range(0.0, 1e12),
+    "push_velocity": Range(0.0, 100.0),
+}
 
 
 PHYSICS_DIM = 5

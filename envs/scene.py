@@ -7,12 +7,13 @@ model is left to `envs.simulation`, finding what the sensors read to `envs.senso
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 import mujoco
+
+from mute.support.ranges import Range, check_number, check_ranges
 
 from .menagerie import dress_in_menagerie
 
@@ -85,13 +86,22 @@ class FloorPatch:
     """Colour in pictures."""
 
     def __post_init__(self) -> None:
-        """Refuse an empty or endless rectangle, and contact parameters out of their range."""
-        corners = (*self.low, *self.high)
-        ordered = self.low[0] < self.high[0] and self.low[1] < self.high[1]
-        if not (ordered and all(math.isfinite(value) for value in corners)):
-            raise ValueError(f"a patch needs low < high in x and y, got {self.low} and {self.high}")
-        _require_number("friction", self.friction, low=0.0, high=10.0)
-        _require_solref("solref", self.solref)
+        """Refuse an empty or endless rectangle, and numbers out of their range."""
+        place = "env.scene.floor_patches"
+        check_ranges(self, place, _PATCH_RANGES)
+        if not (self.low[0] < self.high[0] and self.low[1] < self.high[1]):
+            raise ValueError(
+                f"{place}.low must be < {place}.high in x and y, got {self.low} and {self.high}"
+            )
+        _require_solref(f"{place}.solref", self.solref)
+
+
+_PATCH_RANGES = {
+    "low": Range(-1e6, 1e6),
+    "high": Range(-1e6, 1e6),
+    "friction": Range(0.0, 10.0, above=True),
+    "rgba": Range(0.0, 1.0),
+}
 
 
 @dataclass(frozen=True)
@@ -134,17 +144,23 @@ class SceneCfg:
 
     def __post_init__(self) -> None:
         """Refuse values that MuJoCo would silently take or repair."""
-        _require_number("timestep", self.timestep, low=0.0, high=0.02)
+        check_ranges(self, "env.scene", _SCENE_RANGES)
         _require_choice("integrator", self.integrator, get_args(Integrator))
         _require_choice("cone", self.cone, get_args(Cone))
         _require_choice("solver", self.solver, get_args(Solver))
-        _require_count("iterations", self.iterations)
-        _require_count("ls_iterations", self.ls_iterations)
-        _require_number("floor_friction", self.floor_friction, low=0.0, high=10.0)
-        _require_solref("floor_solref", self.floor_solref, self.timestep)
-        for index, patch in enumerate(self.floor_patches):
-            _require_solref(f"floor_patches[{index}].solref", patch.solref, self.timestep)
         _require_choice("look", self.look, get_args(Look))
+        _require_solref("env.scene.floor_solref", self.floor_solref, self.timestep)
+        for index, patch in enumerate(self.floor_patches):
+            name = f"env.scene.floor_patches[{index}].solref"
+            _require_solref(name, patch.solref, self.timestep)
+
+
+_SCENE_RANGES = {
+    "timestep": Range(0.0, 0.02, above=True),
+    "iterations": Range(1, 10**6, whole=True),
+    "ls_iterations": Range(1, 10**6, whole=True),
+    "floor_friction": Range(0.0, 10.0, above=True),
+}
 
 
 def build_scene(cfg: SceneCfg, foot_samples: int = 0) -> mujoco.MjModel:
@@ -190,41 +206,22 @@ def make_spec(cfg: SceneCfg, foot_samples: int = 0) -> mujoco.MjSpec:
     return spec
 
 
-def _require_number(
-    name: str, value: float, *, low: float, high: float, closed: bool = False
-) -> None:
-    """Refuse a number outside (low, high], or outside [low, high] where `closed`."""
-    inside = (low <= value if closed else low < value) and value <= high
-    if not (math.isfinite(value) and inside):
-        raise ValueError(
-            f"{name} is {value!r}: it must be {'at least' if closed else 'above'} {low:g}"
-            f" and at most {high:g}"
-        )
-
-
 def _require_solref(name: str, solref: tuple[float, float], timestep: float | None = None) -> None:
     """Refuse a contact reference out of its range, for any time step or for the one given (s)."""
     if len(solref) != 2:
         raise ValueError(
-            f"{name} is {solref!r}: it takes two numbers, a time constant (s) and a damping ratio"
+            f"{name} must be two numbers, a time constant (s) and a damping ratio, got {solref}"
         )
-    time_constant, damping_ratio = solref
     # Below two physics steps MuJoCo would stretch the time constant without a word (refsafe).
-    low = 0.0 if timestep is None else 2 * timestep
-    _require_number(f"{name}[0]", time_constant, low=low, high=1.0, closed=timestep is not None)
-    _require_number(f"{name}[1]", damping_ratio, low=0.0, high=10.0)
-
-
-def _require_count(name: str, value: int) -> None:
-    """Refuse a count below 1."""
-    if value < 1:
-        raise ValueError(f"{name} is {value!r}: it must be at least 1")
+    time = Range(0.0, 1.0, above=True) if timestep is None else Range(2 * timestep, 1.0)
+    for index, allowed in enumerate((time, Range(0.0, 10.0, above=True))):
+        check_number(f"{name}[{index}]", solref[index], allowed)
 
 
 def _require_choice(name: str, value: str, allowed: tuple[str, ...]) -> None:
     """Refuse a word that is not among the `allowed` ones."""
     if value not in allowed:
-        raise ValueError(f"{name} is {value!r}: it must be one of {', '.join(allowed)}")
+        raise ValueError(f"env.scene.{name} must be one of {', '.join(allowed)}, got {value!r}")
 
 
 def _set_options(spec: mujoco.MjSpec, cfg: SceneCfg) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import torch
+
+from mute.support.ranges import Range, check_ranges
 
 __all__ = ["FlatTerrain", "HeightMapCfg", "Terrain"]
 
@@ -30,24 +31,16 @@ class HeightMapCfg:
         """Check the lengths.
 
         Raises:
-            ValueError: If spacing or scale is not positive, an extent is negative or no multiple of
-                the spacing, or one of them is not finite.
+            ValueError: If one is out of its range, or an extent is no multiple of the spacing.
         """
-        for name in ("spacing", "scale"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"height_map.{name} must be > 0 and finite, got {value}")
-        if not math.isfinite(self.offset):
-            raise ValueError(f"height_map.offset must be finite, got {self.offset}")
+        check_ranges(self, "env.height_map", _RANGES)
         for name in ("length", "width"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"height_map.{name} must be >= 0 and finite, got {value}")
-            intervals = value / self.spacing
+            extent = getattr(self, name)
+            intervals = extent / self.spacing
             if abs(intervals - round(intervals)) > 1e-6:
                 raise ValueError(
-                    f"height_map.{name} must be a multiple of height_map.spacing,"
-                    f" {self.spacing}, got {value}"
+                    f"env.height_map.{name} must be a multiple of env.height_map.spacing,"
+                    f" {self.spacing}, got {extent}"
                 )
 
     def grid(self, device: torch.device | str = "cpu") -> torch.Tensor:
@@ -63,6 +56,15 @@ class HeightMapCfg:
     def metres(self, normalised: torch.Tensor) -> torch.Tensor:
         """Return normalised heights in m."""
         return self.offset + self.scale * normalised
+
+
+_RANGES = {
+    "length": Range(0.0, 10.0),
+    "width": Range(0.0, 10.0),
+    "spacing": Range(0.01, 10.0),
+    "offset": Range(-10.0, 10.0),
+    "scale": Range(0.001, 10.0),
+}
 
 
 class Terrain(ABC):

@@ -230,15 +230,11 @@ class TaskCfg:
     """Learning."""
 
     def __post_init__(self) -> None:
-        """Check what neither part can know alone, and what the environment leaves to torch.
+        """Check what neither part can know alone.
 
         Raises:
-            ValueError: If the seed is none that torch takes, there are too many robots, or
-                mini-batches would be empty.
+            ValueError: If mini-batches would be empty, or left and right cannot be treated alike.
         """
-        check_ranges(self.env, "env", {"num_envs": Range(1, 2**20, whole=True)})
-        if not 0 <= self.env.seed < 2**63:
-            raise ValueError(f"env.seed must be in [0, 2^63), got {self.env.seed}")
         num_envs, agent = self.env.num_envs, self.agent
         samples = num_envs * agent.num_steps_per_env
         if agent.ppo.num_mini_batches > samples:

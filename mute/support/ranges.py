@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = ["Range", "check_ranges"]
+__all__ = ["Range", "check_number", "check_ordered", "check_ranges"]
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,33 @@ def check_ranges(cfg: object, place: str, ranges: Mapping[str, Range]) -> None:
         numbers = value if isinstance(value, tuple | list) else (value,)
         if not all(map(allowed.holds, numbers)):
             raise ValueError(f"{place}.{name} must be {allowed}, got {value}")
+
+
+def check_number(name: str, value: float, allowed: Range) -> None:
+    """Check one number under its whole name.
+
+    Raises:
+        ValueError: If it is out of its range.
+    """
+    if not allowed.holds(value):
+        raise ValueError(f"{name} must be {allowed}, got {value}")
+
+
+def check_ordered(cfg: object, place: str, *names: str) -> None:
+    """Check that fields hold two numbers each, of which the second is no smaller.
+
+    Args:
+        cfg: The configuration.
+        place: What stands before the names of its fields.
+        *names: The fields.
+
+    Raises:
+        ValueError: If one does not.
+    """
+    for name in names:
+        value = getattr(cfg, name)
+        if len(value) != 2 or value[0] > value[1]:
+            raise ValueError(f"{place}.{name} must be (low, high) with low <= high, got {value}")
 
 
 def _digits(value: float) -> str:

@@ -55,7 +55,7 @@ def test_plain_data_shares_nothing_with_the_configuration():
         ({"env": {"nope": 1}}, ["nope", "env"]),
         ({"agnet": {}}, ["agnet"]),
         ({"agent": {"ppo": {"gama": 0.9}}}, ["gama", "agent.ppo"]),
-        ({"env": {"num_envs": -1}}, ["env.num_envs must be >= 1, got -1"]),
+        ({"env": {"num_envs": -1}}, ["env.num_envs must be an integer >= 1", "got -1"]),
         ({"env": {"num_envs": 2.7}}, ["env.num_envs", "2.7"]),
         ({"env": {"num_envs": "many"}}, ["env.num_envs", "many"]),
         ({"env": {"random_heading": "False"}}, ["env.random_heading", "False"]),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from mute.support.ranges import Range, check_ranges
+from mute.support.ranges import Range, check_number, check_ordered, check_ranges
 
 
 @pytest.mark.parametrize(
@@ -41,6 +41,22 @@ def test_a_range_says_what_it_allows(allowed, words):
 @dataclass
 class _Cfg:
     bounds: tuple[float, float] = (0.0, 1.0)
+
+
+@pytest.mark.parametrize("bounds", [(1.0, 0.5), (1.0,), (0.0, 0.5, 1.0)])
+def test_two_numbers_that_are_not_in_order_or_not_two_are_refused(bounds):
+    check_ordered(_Cfg((0.5, 0.5)), "cfg", "bounds")
+    with pytest.raises(ValueError) as caught:
+        check_ordered(_Cfg(bounds), "cfg", "bounds")
+    expected = f"cfg.bounds must be (low, high) with low <= high, got {bounds}"
+    assert str(caught.value) == expected
+
+
+def test_one_number_is_refused_under_its_whole_name():
+    check_number("cfg.sizes[1]", 1.0, Range(0.0, 1.0))
+    with pytest.raises(ValueError) as caught:
+        check_number("cfg.sizes[1]", 2.0, Range(0.0, 1.0))
+    assert str(caught.value) == "cfg.sizes[1] must be >= 0 and <= 1, got 2.0"
 
 
 def test_of_a_field_with_several_numbers_each_is_checked_and_all_are_told():
