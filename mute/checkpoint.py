@@ -1,7 +1,8 @@
 """Checkpoint files: written atomically, read without running anything that they hold.
 
-A checkpoint is a torch archive of plain data with a small header. What goes into it, and what is
-done with it after loading, is left to the runner and the players.
+A checkpoint is a torch archive of plain data with a small header. torch does not look at the
+checksums of its own archives; here a file with a flipped bit is refused. What goes into it, and
+what is done with it after loading, is left to the runner and the players.
 """
 
 from __future__ import annotations
@@ -28,6 +29,10 @@ _SCALAR_TYPES = (str, int, float, bool, type(None))
 _TENSOR_TYPES = (torch.Tensor, torch.nn.Parameter)
 _ZIP_MAGIC = b"PK\x03\x04"
 _PICKLE_MAGIC = b"\x80"
+_DIRECTORY = 0x10
+"""Attribute of a directory in an archive: torch reads nothing of it, and takes what is there."""
+_AT_ONCE = 2**20
+"""Bytes that are summed at once: of a large file no more is held."""
 
 
 class CheckpointError(MuteError):
@@ -56,8 +61,7 @@ def save_checkpoint(path: Path, payload: dict[str, Any]) -> None:
             raise ValueError(f"payload[{key!r}] is reserved for the checkpoint's header")
     _check_plain(payload, "payload")
     # Serialised in memory first: a payload that cannot be saved never touches the disk.
-    buffer = io.BytesIO()
-    torch.save({"format": _FORMAT, "version": _VERSION, **payload}, buffer)
+    buffer = _archive({"format": _FORMAT, "version": _VERSION, **payload})
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         replace_file(path, buffer.getbuffer())
@@ -73,17 +77,19 @@ def load_checkpoint(path: Path, map_location: str | torch.device = "cpu") -> dic
         map_location: Device that the tensors are put on.
 
     Raises:
-        CheckpointError: The file is missing, a directory, cut short, not a checkpoint of this
-            project, written by a newer version, or holds pickled code; one line that names it.
+        CheckpointError: The file is missing, a directory, cut short, damaged, not a checkpoint of
+            this project, written by a newer version, or holds pickled code or anything else than
+            plain data; one line that names it.
     """
     _check_archive(path)
+    _check_sums(path)
     try:
         content = torch.load(path, map_location=map_location, weights_only=True)
     except Exception as error:  # a damaged archive can make the reader raise anything
         if isinstance(error, pickle.UnpicklingError) and _holds_code(path):
             raise _code_refused(path) from None
         raise CheckpointError(
-            f"{path} is not a readable checkpoint: {first_line(error)}"
+            f"{path} is not a readable checkpoint, or damaged: {first_line(error)}"
         ) from error
     if not isinstance(content, dict) or content.get("format") != _FORMAT:
         raise CheckpointError(f"{path} was written by another program, not a MUTE checkpoint")
@@ -95,6 +101,10 @@ def load_checkpoint(path: Path, map_location: str | torch.device = "cpu") -> dic
             f"{path} was written by a newer MUTE: checkpoint version {version}, "
             f"this one reads up to {_VERSION}"
         )
+    try:
+        _check_plain(content, "it")
+    except (TypeError, RecursionError) as error:
+        raise CheckpointError(f"{path} is no MUTE checkpoint: {first_line(error)}") from error
     return {key: value for key, value in content.items() if key not in _HEADER_KEYS}
 
 
@@ -172,8 +182,37 @@ def _check_archive(path: Path) -> None:
         raise _code_refused(path)
     if start != _ZIP_MAGIC:
         raise CheckpointError(f"{path} is not a checkpoint")
-    if not zipfile.is_zipfile(path):  # the archive's directory stands at its end
-        raise CheckpointError(f"{path} is cut short")
+
+
+def _archive(content: dict[str, Any]) -> io.BytesIO:
+    """Return torch's archive, with its checksums even where the process does without."""
+    buffer = io.BytesIO()
+    sums = torch.serialization.get_crc32_options()
+    torch.serialization.set_crc32_options(True)
+    try:
+        torch.save(content, buffer)
+    finally:
+        torch.serialization.set_crc32_options(sums)
+    return buffer
+
+
+def _check_sums(path: Path) -> None:
+    """Raise CheckpointError unless the archive is whole and every part has its checksum."""
+    try:
+        if not zipfile.is_zipfile(path):  # the archive's directory stands at its end
+            raise CheckpointError(f"{path} is cut short or damaged")
+        with zipfile.ZipFile(path) as archive:
+            # By entry, not by name as `testzip` does: a flipped bit can make two names alike.
+            for entry in archive.infolist():
+                if entry.is_dir() or entry.external_attr & _DIRECTORY:
+                    raise zipfile.BadZipFile(f"{entry.filename!r} is said to be a directory")
+                with archive.open(entry) as part:
+                    while part.read(_AT_ONCE):
+                        pass
+    except CheckpointError:
+        raise
+    except Exception as error:  # a flipped bit can make the reader raise anything
+        raise CheckpointError(f"{path} is damaged: {first_line(error)}") from error
 
 
 def _holds_code(path: Path) -> bool:

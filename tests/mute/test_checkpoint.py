@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from places import REPOSITORY
+from places import REPOSITORY, SHIPPED_POLICY
 
 from mute.checkpoint import CheckpointError, latest_checkpoint, load_checkpoint, save_checkpoint
 
@@ -217,6 +217,105 @@ def test_a_damaged_pickle_inside_the_archive_is_an_error_of_one_line(tmp_path):
     with pytest.raises(CheckpointError, match="is not a readable checkpoint") as caught:
         load_checkpoint(path)
     assert "\n" not in str(caught.value)
+
+
+def _assert_refused_or_equal(path: Path, payload: dict) -> bool:
+    """Load a file and return whether it is refused; what loads must be the payload, bit by bit."""
+    try:
+        loaded = load_checkpoint(path)
+    except CheckpointError as error:
+        assert "\n" not in str(error)
+        assert path.name in str(error)
+        return True
+    _assert_bit_equal(loaded, payload)
+    return False
+
+
+def test_a_flipped_bit_anywhere_is_refused_or_changes_nothing(tmp_path):
+    path = tmp_path / "model_1.pt"
+    payload = {"weight": torch.tensor([[0.5, -1.0], [2.0, 3.0]]), "iter": 3, "figures": [1.0, 2]}
+    save_checkpoint(path, payload)
+    data = path.read_bytes()
+    refused = 0
+    for place in range(0, len(data), 3):
+        damaged = bytearray(data)
+        damaged[place] ^= 1 << place % 8  # 3 and 8 share no factor: all bits have their turn
+        path.write_bytes(damaged)
+        refused += _assert_refused_or_equal(path, payload)
+    # What loads is padding, times and attributes.
+    assert refused > len(data) // 9
+
+
+@pytest.mark.parametrize("part", ["data.pkl", "data/0", "data/1"])
+def test_a_flipped_bit_of_what_is_saved_is_damage_and_so_called(tmp_path, part):
+    path = tmp_path / "model_1.pt"
+    save_checkpoint(path, {"weight": torch.ones(64), "bias": torch.full((64,), 2.0)})
+    data = bytearray(path.read_bytes())
+    with zipfile.ZipFile(path) as archive:
+        (entry,) = (one for one in archive.infolist() if one.filename.endswith(f"/{part}"))
+        place = data.index(archive.read(entry))
+    for offset in (0, entry.file_size // 2, entry.file_size - 1):
+        for bit in range(8):
+            damaged = bytearray(data)
+            damaged[place + offset] ^= 1 << bit
+            path.write_bytes(damaged)
+            with pytest.raises(CheckpointError, match=r"model_1\.pt is damaged: Bad CRC-32"):
+                load_checkpoint(path)
+
+
+def test_a_part_that_is_said_to_be_a_directory_is_refused(tmp_path):
+    path = tmp_path / "model_1.pt"
+    save_checkpoint(path, {"weight": torch.ones(64)})
+    data = bytearray(path.read_bytes())
+    # torch would leave the weight's memory as it found it.
+    entry = data.rindex(b"/data/0") - len("archive")
+    data[entry - 8] |= 0x10
+    path.write_bytes(data)
+    with pytest.raises(CheckpointError, match="is said to be a directory"):
+        load_checkpoint(path)
+
+
+def test_checksums_are_written_even_where_the_process_does_without(tmp_path):
+    path = tmp_path / "model_1.pt"
+    torch.serialization.set_crc32_options(False)
+    try:
+        save_checkpoint(path, {"weight": torch.ones(64)})
+        assert torch.serialization.get_crc32_options() is False
+    finally:
+        torch.serialization.set_crc32_options(True)
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+    assert torch.equal(load_checkpoint(path)["weight"], torch.ones(64))
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"sizes": torch.Size([1, 2])}, r"it\['sizes'\] is a torch.Size"),
+        ({"kind": torch.float32}, r"it\['kind'\] is a torch.dtype"),
+        ({"names": {"a", "b"}}, r"it\['names'\] is a set"),
+        ({"raw": bytearray(b"abc")}, r"it\['raw'\] is a bytearray"),
+        ({(1, 2): 3}, r"it has the key \(1, 2\)"),
+    ],
+    ids=lambda value: next(iter(value), None) if isinstance(value, dict) else None,
+)
+def test_what_is_no_plain_data_is_refused_though_torch_would_take_it(tmp_path, content, words):
+    path = tmp_path / "model_1.pt"
+    torch.save({"format": "mute-checkpoint", "version": 1, **content}, path)
+    with pytest.raises(CheckpointError, match=rf"model_1\.pt is no MUTE checkpoint: {words}"):
+        load_checkpoint(path)
+
+
+def test_a_list_inside_itself_is_refused(tmp_path):
+    path, endless = tmp_path / "model_1.pt", []
+    endless.append(endless)
+    torch.save({"format": "mute-checkpoint", "version": 1, "endless": endless}, path)
+    with pytest.raises(CheckpointError, match=r"model_1\.pt is no MUTE checkpoint"):
+        load_checkpoint(path)
+
+
+def test_the_shipped_policy_has_its_checksums_and_loads():
+    assert load_checkpoint(SHIPPED_POLICY)["task"] == "go1_mute"
 
 
 def test_a_missing_checkpoint_names_the_path_and_what_to_give(tmp_path):
