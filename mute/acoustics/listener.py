@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mute.acoustics.contacts import ContactBlock
 from mute.acoustics.energy import EnergyMeter
-from mute.acoustics.files.wav_file import WavFile
+from mute.acoustics.files.writing import WavWriter
 from mute.acoustics.metering.levels import settling_time
 from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
 from mute.acoustics.microphone import Microphone
@@ -99,7 +99,7 @@ class Listener:
         )
         self._from_energies = from_energies
         self._paths = {0: wav} if isinstance(wav, Path) else dict(wav or {})
-        self._files: dict[int, WavFile] = {}
+        self._files: dict[int, WavWriter] = {}
         self._closing = contextlib.ExitStack()
         self._soundscape = None
         if self._paths or not from_energies:
@@ -122,7 +122,7 @@ class Listener:
         """
         with contextlib.ExitStack() as opened:
             for robot, path in self._paths.items():
-                self._files[robot] = WavFile(path, SAMPLE_RATE, WAV_FULL_SCALE)
+                self._files[robot] = WavWriter(path, SAMPLE_RATE, WAV_FULL_SCALE)
                 opened.callback(self._close_file, robot)
             self._closing = opened.pop_all()
         return self

@@ -4,11 +4,10 @@ It gives the figures of `levels` (MNL, PNL, LAeq, LAFmax, L10, L90) of a real re
 meter of `sound_level_meter`, which also hears the robots in simulation.
 
 A recording is calibrated with a second one, made with the same gain, of a sound calibrator that
-gives a known level (usually 94 dB at 1 kHz). Its A-weighted level over its whole length is taken to
-be that level: at 1 kHz the weighting is 0 dB, and hum, wind and an offset are kept out. So the
-file must hold the steady tone alone, and for a calibrator at another frequency its A-weighted level
-must be given (124 dB at 250 Hz: 115.4). Without a calibration the figures are in dB re full scale,
-dBFS(A), where 0 dB is a root mean square of 1: a full sine of 1 kHz has -3.0.
+gives a known level (usually 94 or 114 dB at 1 kHz); see `calibrator`. For one at another frequency
+that is given, too (124 dB at 250 Hz: `--calibration-db 124 --calibration-frequency 250`). Without a
+calibration the figures are in dB re full scale, dBFS(A), where 0 dB is a root mean square of 1: a
+full sine of 1 kHz has -3.0.
 
 Of a recording with several channels, the figures are those of the energy mean (at each instant the
 mean of the squares), or of one channel that is chosen.
@@ -18,7 +17,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,34 +27,27 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from mute.acoustics.files.wav import WavReader, read_wav
-from mute.acoustics.metering.levels import (
-    P_REF,
-    LevelDetector,
-    Levels,
-    TimeWeighting,
-    settling_time,
-)
+from mute.acoustics.files.reading import WavReader
+from mute.acoustics.metering.calibrator import Calibration, Calibrator, calibrate
+from mute.acoustics.metering.levels import P_REF, TimeWeighting
 from mute.acoustics.metering.loudness import zwicker_loudness
-from mute.acoustics.metering.sound_level_meter import SAMPLES_AT_ONCE, SoundLevelMeter
-from mute.acoustics.metering.weighting import MAX_SAMPLE_RATE, MIN_SAMPLE_RATE, AWeighting
+from mute.acoustics.metering.wav_levels import (
+    chosen_channels,
+    doubts,
+    energy_mean_levels,
+    open_wav,
+)
 from mute.command_lines.arguments import command_line, parse
 from mute.support.errors import MuteError
 from mute.support.plain_data import without_nan
 
 __all__ = ["MeterArgs", "main"]
 
-_WIDE_BAND_RATE = 32000
-"""Sample rate below which a part of what is heard is missing, Hz."""
+_CALIBRATOR_LEVELS = (60.0, 130.0)
+"""Levels of sound calibrators, dB: what is on the market lies within them."""
 
-_STEADY = 1.0
-"""Largest L10 - L90 of a calibration recording, dB (chosen)."""
-
-_ALIKE = 6.0
-"""Largest difference between the channels of a calibration recording, dB (chosen)."""
-
-_SILENT = -120.0
-"""Level below which there is no calibrator in a recording, dBFS(A) (chosen)."""
+_CALIBRATOR_FREQUENCIES = (100.0, 10000.0)
+"""Frequencies of sound calibrators that are taken, Hz (chosen)."""
 
 _CAPTIONS = {
     "mnl": "mean of the readings",
@@ -73,11 +64,13 @@ class MeterArgs:
     """Arguments of the meter."""
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.wav")]
-    """Recording (WAV)."""
+    """Recording (WAV); /dev/stdin for one that comes through a pipe."""
     calibration_db: float | None = None
-    """Level of the sound calibrator, dB (of 1 kHz; else its A-weighted level)."""
+    """Level of the sound calibrator, as its label says, dB."""
     calibration_file: Path | None = None
     """Recording of the calibrator's steady tone, with the same gain."""
+    calibration_frequency: float | None = None
+    """Frequency of the sound calibrator, Hz. Default: 1000."""
     time_weighting: Literal["fast", "slow"] = "fast"
     """Time weighting: fast (125 ms) or slow (1 s)."""
     channel: int | None = None
@@ -117,165 +110,86 @@ def _check(args: MeterArgs) -> None:
         raise MuteError("--calibration-db needs --calibration-file, the calibrator's recording")
     if args.calibration_file is not None and args.calibration_db is None:
         raise MuteError("--calibration-file needs --calibration-db, the calibrator's level")
-    if args.calibration_db is not None and not math.isfinite(args.calibration_db):
-        raise MuteError(f"--calibration-db must be a level in dB, got {args.calibration_db}")
+    if args.calibration_frequency is not None and args.calibration_file is None:
+        raise MuteError("--calibration-frequency needs --calibration-file")
+    _check_range("--calibration-db", args.calibration_db, _CALIBRATOR_LEVELS, "dB")
+    _check_range(
+        "--calibration-frequency", args.calibration_frequency, _CALIBRATOR_FREQUENCIES, "Hz"
+    )
     if args.loudness and args.calibration_file is None:
         raise MuteError("--loudness needs --calibration-db and --calibration-file")
 
 
+def _check_range(name: str, value: float | None, allowed: tuple[float, float], unit: str) -> None:
+    """Refuse a value that is out of its range.
+
+    Raises:
+        MuteError: If it is.
+    """
+    low, high = allowed
+    if value is not None and not low <= value <= high:  # which NaN is not
+        raise MuteError(f"{name} must be {low:g} to {high:g} {unit}, got {value:g}")
+
+
 def _figures(args: MeterArgs) -> dict[str, Any]:
     """Return all figures of a recording, as the JSON has them."""
-    warnings: list[str] = []
-    with _open(args.file) as wav:
-        channels = _chosen(wav, args.channel)
+    with open_wav(args.file) as wav:
+        channels = chosen_channels(wav, args.channel)
         if args.loudness and len(channels) > 1:
             raise MuteError(f"{args.file}: loudness is of one channel, choose it with --channel")
-        gains = _gains(args, wav.channels, channels, warnings)
-        detector = _detect(wav, channels, gains, args)
-        (levels,) = detector.result()
-        clipped = int(wav.clipped[channels].sum())
-        figures = {
+        calibration = _calibration(args, wav, channels)
+        gains = np.ones(len(channels)) if calibration is None else calibration.gains
+        reference = 1.0 if calibration is None else P_REF
+        levels = energy_mean_levels(wav, channels, gains, args.time_weighting, reference)
+        warnings = [] if calibration is None else list(calibration.warnings)
+        warnings += doubts(wav, channels, levels, args.time_weighting)
+        figures: dict[str, Any] = {
             **dataclasses.asdict(levels),
             "file": str(args.file),
-            "unit": "dBFS(A)" if args.calibration_file is None else "dBA",
-            "reference": "full scale" if args.calibration_file is None else "20 uPa",
+            "unit": "dBFS(A)" if calibration is None else "dBA",
+            "reference": "full scale" if calibration is None else "20 uPa",
             "time_weighting": args.time_weighting,
             "channels": wav.channels,
             "channel": args.channel if wav.channels > 1 else 1,
-            "clipped": clipped,
+            "clipped": int(wav.clipped[channels].sum()),
         }
-    warnings += _doubts(args, figures)
-    if args.loudness:
-        samples, sample_rate = read_wav(args.file)
-        loudness = zwicker_loudness(gains[0] * samples[channels[0]], sample_rate)
-        figures |= {"loudness_n5": loudness.n5, "loudness_max": loudness.maximum}
+        if args.loudness:
+            figures |= _loudness(wav, channels, gains)
     return figures | {"warnings": warnings}
 
 
-def _open(path: Path) -> WavReader:
-    """Open a recording.
-
-    Raises:
-        MuteError: If it cannot be read, or its sample rate is too low or too high.
-    """
-    wav = WavReader(path)
-    if not MIN_SAMPLE_RATE <= wav.sample_rate <= MAX_SAMPLE_RATE:
-        raise MuteError(
-            f"{path}: sample rate {wav.sample_rate} Hz, levels need {MIN_SAMPLE_RATE} to "
-            f"{MAX_SAMPLE_RATE} Hz"
-        )
-    return wav
-
-
-def _chosen(wav: WavReader, channel: int | None) -> list[int]:
-    """Return the indices of the channels to measure.
-
-    Raises:
-        MuteError: If there is no such channel.
-    """
-    if channel is None:
-        return list(range(wav.channels))
-    if not 1 <= channel <= wav.channels:
-        raise MuteError(f"{wav.path}: --channel must be 1 to {wav.channels}, got {channel}")
-    return [channel - 1]
-
-
-def _gains(
-    args: MeterArgs, num_channels: int, channels: list[int], warnings: list[str]
-) -> NDArray[np.float64]:
-    """Return what full scale of each measured channel is in Pa, or 1 without a calibration.
-
-    Args:
-        args: Arguments.
-        num_channels: Channels of the recording.
-        channels: Indices of those that are measured.
-        warnings: Doubts are added here.
+def _calibration(args: MeterArgs, wav: WavReader, channels: list[int]) -> Calibration | None:
+    """Return what full scale of each measured channel is, or of all; nothing if uncalibrated.
 
     Raises:
         MuteError: If the calibration recording is not one.
     """
     path, level = args.calibration_file, args.calibration_db
     if path is None or level is None:
-        return np.ones(len(channels))
-    with _open(path) as wav:
-        if wav.channels not in (1, num_channels):
+        return None
+    with open_wav(path) as tone:
+        if tone.channels not in (1, wav.channels):
             raise MuteError(
-                f"{path}: {wav.channels} channels, but {num_channels} in {args.file}; "
+                f"{path}: {tone.channels} channels, but {wav.channels} in {args.file}; "
                 "a calibration has one or as many"
             )
-        meter = SoundLevelMeter(wav.sample_rate, wav.channels, reference=1.0)
-        for block in wav.blocks():
-            meter.update(block)
-        used = [0] * len(channels) if wav.channels == 1 else channels
-        results = meter.result()
-        tones = [results[channel] for channel in used]
-        clipped = int(wav.clipped[used].sum())
-    _check_tones(path, tones)
-    if clipped:
-        warnings.append(f"{path}: {clipped} samples at full scale, the calibration is clipped")
-    unsteady = max(tone.l10 - tone.l90 for tone in tones)
-    if unsteady > _STEADY:
-        warnings.append(f"{path}: not a steady tone, its L10 is {unsteady:.1f} dB above its L90")
-    return P_REF * 10.0 ** ((level - np.array([tone.laeq for tone in tones])) / 20.0)
+        frequency = args.calibration_frequency or Calibrator.frequency
+        used = channels if tone.channels > 1 else [0]
+        return calibrate(tone, Calibrator(level, frequency), used)
 
 
-def _check_tones(path: Path, tones: list[Levels]) -> None:
-    """Refuse levels that cannot be those of a calibrator.
+def _loudness(wav: WavReader, channels: list[int], gains: NDArray[np.float64]) -> dict[str, float]:
+    """Return the loudness of a recording, as the JSON has it.
 
     Raises:
-        MuteError: If the recording is too short, silent, or of one channel of several.
+        MuteError: If it cannot be taken.
     """
-    if tones[0].readings == 0:
-        raise MuteError(f"{path}: too short for a calibration ({tones[0].seconds:.2f} s)")
-    levels = [tone.laeq for tone in tones]
-    spread = max(levels) - min(levels)
-    if max(levels) < _SILENT:
-        raise MuteError(f"{path}: silent, there is no calibrator's tone in it")
-    if spread > _ALIKE:
-        raise MuteError(
-            f"{path}: its channels differ by {spread:.1f} dB, as if one microphone had "
-            "the calibrator; choose that one with --channel"
-        )
-
-
-def _detect(
-    wav: WavReader, channels: list[int], gains: NDArray[np.float64], args: MeterArgs
-) -> LevelDetector:
-    """Return the detector after the whole recording, for the energy mean of its channels."""
-    reference = 1.0 if args.calibration_file is None else P_REF
-    weighting = AWeighting(wav.sample_rate)
-    detector = LevelDetector(wav.sample_rate, 1, args.time_weighting, reference)
-    for block in wav.blocks(max(SAMPLES_AT_ONCE // wav.channels, 1)):
-        weighted = weighting.filter(gains[:, None] * block[channels])
-        detector.update(np.square(weighted).mean(axis=0, keepdims=True))
-    return detector
-
-
-def _doubts(args: MeterArgs, figures: dict[str, Any]) -> list[str]:
-    """Return what a user must know about the figures of a recording."""
-    doubts = []
-    if figures["clipped"]:
-        doubts.append(
-            f"{args.file}: {figures['clipped']} samples at full scale, the recording is clipped "
-            "and its levels are too low"
-        )
-    if figures["readings"] == 0:
-        settling = settling_time(args.time_weighting)
-        doubts.append(
-            f"{args.file}: shorter than the {settling:g} s in which the detector settles, "
-            "so there are no readings"
-        )
-    elif figures["mnl"] == -math.inf:
-        doubts.append(f"{args.file}: digital silence in the readings, they have no mean")
-    if figures["sample_rate"] < _WIDE_BAND_RATE:
-        half = figures["sample_rate"] // 2
-        doubts.append(f"{args.file}: nothing above {half} Hz is in it, half its sample rate")
-    if figures["channel"] is None:
-        doubts.append(
-            f"{args.file}: {figures['channels']} channels, measured as their energy mean; "
-            "choose one with --channel"
-        )
-    return doubts
+    samples = np.concatenate([block[channels[0]] for block in wav.blocks()])
+    try:
+        loudness = zwicker_loudness(gains[0] * samples, wav.sample_rate)
+    except ValueError as error:
+        raise MuteError(f"{wav.path}: no loudness can be taken: {error}") from error
+    return {"loudness_n5": loudness.n5, "loudness_max": loudness.maximum}
 
 
 def _print_figures(figures: dict[str, Any]) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from mute.acoustics.audible_env import audible_cfg
-from mute.acoustics.files.wav import has_samples
+from mute.acoustics.files.writing import has_samples
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
 from mute.acoustics.live_listener import LiveListener

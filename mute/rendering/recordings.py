@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mute.acoustics.files.wav import has_samples
+from mute.acoustics.files.writing import has_samples
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.rendering.sound_track import temporary_sound
 

@@ -24,6 +24,9 @@ __all__ = ["Loudness", "zwicker_loudness"]
 _SAMPLE_RATE = 48000
 """The one rate that the library takes, Hz."""
 
+_SHORTEST = 0.01
+"""Shortest sound of which a loudness is taken, s: a few of the library's steps of 2 ms."""
+
 
 @dataclass(frozen=True)
 class Loudness:
@@ -44,8 +47,14 @@ def zwicker_loudness(pressure: NDArray, sample_rate: int) -> Loudness:
 
     Raises:
         MuteError: If MOSQITO is not installed.
+        ValueError: If the sound is too short, or louder than the method allows: 120 dB in a third
+            octave up to 250 Hz.
     """
     method = _find_method()
+    if len(pressure) < _SHORTEST * sample_rate:
+        raise ValueError(
+            f"a sound of {_SHORTEST:g} s or more is needed, got {len(pressure) / sample_rate:.4f} s"
+        )
     if sample_rate != _SAMPLE_RATE:
         common = math.gcd(sample_rate, _SAMPLE_RATE)
         pressure = signal.resample_poly(pressure, _SAMPLE_RATE // common, sample_rate // common)

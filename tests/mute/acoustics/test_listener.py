@@ -11,7 +11,7 @@ import torch
 from places import SHIPPED_POLICY
 
 from mute.acoustics.audible_env import listening_cfg, make_listening_env
-from mute.acoustics.files.wav import read_wav
+from mute.acoustics.files.reading import read_wav
 from mute.acoustics.gains import load_gains
 from mute.acoustics.listener import SAMPLE_RATE, Listener
 from mute.acoustics.metering.levels import LevelDetector

@@ -12,7 +12,7 @@ import torch
 from tensordict import TensorDict
 
 from mute.acoustics.audible_env import audible_cfg
-from mute.acoustics.files.wav import read_wav
+from mute.acoustics.files.reading import read_wav
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
 from mute.acoustics.live_listener import LiveListener

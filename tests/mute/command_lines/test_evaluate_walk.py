@@ -14,7 +14,7 @@ import torch
 import yaml
 from places import SHIPPED_POLICY
 
-from mute.acoustics.files.wav import read_wav
+from mute.acoustics.files.reading import read_wav
 from mute.acoustics.listener import WAV_FULL_SCALE
 from mute.acoustics.metering.sound_level_meter import measure
 from mute.acoustics.microphone import Microphone

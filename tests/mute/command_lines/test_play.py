@@ -16,7 +16,7 @@ import torch
 from places import REPOSITORY
 from tensordict import TensorDict
 
-from mute.acoustics.files.wav import read_wav
+from mute.acoustics.files.reading import read_wav
 from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
 from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
 from mute.checkpoint import save_checkpoint

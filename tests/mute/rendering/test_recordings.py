@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from mute.acoustics.files.wav_file import WavFile
+from mute.acoustics.files.writing import WavWriter
 from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
@@ -34,7 +34,7 @@ def test_what_never_began_leaves_no_file_and_is_told(env, tmp_path, stopped):
 
     def walk():
         with filming(env, wanted, start=1.0) as films:
-            WavFile(films.sounds[0], SAMPLE_RATE, WAV_FULL_SCALE).close()
+            WavWriter(films.sounds[0], SAMPLE_RATE, WAV_FULL_SCALE).close()
             films.record()  # of a tenth of the time after which the film begins
             if stopped:
                 raise KeyboardInterrupt

@@ -16,8 +16,9 @@ import pytest
 import torch
 from places import REPOSITORY
 from tensordict import TensorDict
+from wav_helpers import write_sound
 
-from mute.acoustics.files.wav import read_wav, write_wav
+from mute.acoustics.files.reading import read_wav
 from mute.acoustics.listener import SAMPLE_RATE
 from mute.checkpoint import save_checkpoint
 from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
@@ -191,7 +192,7 @@ def test_a_film_gets_the_sound_and_keeps_its_pictures(film):
     before = imageio.imread(film)
     wav = film.with_name("tone.wav")
     tone = 0.5 * np.sin(2.0 * np.pi * 1000.0 * np.arange(24000) / 48000.0)
-    write_wav(wav, tone, 48000)
+    write_sound(wav, tone, 48000)
     add_sound(film, wav)
     np.testing.assert_array_equal(imageio.imread(film), before)
     sound = _sound_of(film)

@@ -1,24 +1,31 @@
-"""A WAV file that is written as its sound is made, in memory that does not grow."""
+"""A WAV file that is written as its sound is made, in memory that does not grow.
+
+The header is written here, not by soundfile: a disk that is full must be told as one line, and
+libsndfile says nothing of a header that it cannot complete.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mute.acoustics.files.wav import PCM, WavFormat, wav_header
 from mute.support.errors import MuteError
 
-__all__ = ["WavFile"]
+__all__ = ["WavWriter", "has_samples"]
 
 _MOST_SAMPLES = 43200 * 48000
 """Samples at which a file ends though the walk goes on: it holds 4 GiB, 12 hours at 48 kHz."""
 
+_HEADER_BYTES = 44
+"""Length of what is before the samples."""
 
-class WavFile:
+
+class WavWriter:
     """A mono WAV file of 16 bits that grows as samples come; what came is whole after `close`."""
 
     def __init__(self, path: Path, sample_rate: int, full_scale: float) -> None:
@@ -68,7 +75,13 @@ class WavFile:
             self._file.write(self._header())
 
     def _header(self) -> bytes:
-        return wav_header(WavFormat(PCM, 1, self._sample_rate, 16, 16), 2 * self._samples)
+        length = 2 * self._samples
+        return struct.pack(
+            "<4sI4s4sIHHIIHH4sI",
+            *(b"RIFF", _HEADER_BYTES - 8 + length, b"WAVE"),
+            *(b"fmt ", 16, 1, 1, self._sample_rate, 2 * self._sample_rate, 2, 16),
+            *(b"data", length),
+        )
 
     @contextlib.contextmanager
     def _told(self) -> Iterator[None]:
@@ -77,3 +90,8 @@ class WavFile:
             yield
         except OSError as error:
             raise MuteError(f"cannot write {self.path}: {error.strerror}") from error
+
+
+def has_samples(path: Path) -> bool:
+    """Tell whether a WAV file that was written here holds any sample."""
+    return path.stat().st_size > _HEADER_BYTES
