@@ -31,6 +31,10 @@ from mute.support.files import replace_file
 __all__ = ["export_policy"]
 
 _OPSET = 18
+"""Version of the operators: the oldest that torch's exporter writes."""
+_IR_VERSION = 8
+"""Version of the file format: the one of the first ONNX that had this opset. torch writes a newer
+one, which ONNX Runtime refuses up to 1.17, while nothing in the graph needs it."""
 _INPUTS = ("obs", "h_in", "c_in")
 _OUTPUTS = ("action", "phase", "base_lin_vel", "h_out", "c_out")
 _RECURRENT_STATE = {"h_in": "h_out", "c_in": "c_out"}
@@ -112,6 +116,7 @@ def _graph(policy: Policy) -> onnx.ModelProto:
         raise RuntimeError("torch.onnx.export returned no program")
     model = program.model_proto
     _strip_notes(model.graph)
+    model.ir_version = _IR_VERSION
     return model
 
 

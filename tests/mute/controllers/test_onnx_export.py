@@ -16,7 +16,7 @@ import onnx
 import onnxruntime
 import pytest
 import torch
-from places import REPOSITORY
+from places import REPOSITORY, RESOURCES
 
 from mute.checkpoint import save_checkpoint
 from mute.command_lines.export import main
@@ -190,6 +190,17 @@ def test_the_graph_has_the_agreed_inputs_and_outputs(exported: Path):
 def test_the_opset_is_at_least_17(exported: Path):
     versions = {entry.domain: entry.version for entry in onnx.load(exported).opset_import}
     assert versions[""] >= 17
+
+
+@pytest.mark.parametrize("shipped", [False, True])
+def test_the_file_is_of_the_oldest_format_that_has_its_opset(exported: Path, shipped: bool):
+    # ONNX Runtime 1.17 refuses formats above 9, and the format came before its operators' version.
+    path = RESOURCES / "go1" / "go1_mute.onnx" if shipped else exported
+    model = onnx.load(path)
+    (opset,) = (entry.version for entry in model.opset_import if not entry.domain)
+    assert model.ir_version == onnx.helper.find_min_ir_version_for(model.opset_import) == 8
+    assert opset == 18
+    onnx.checker.check_model(model, full_check=True)
 
 
 def test_activations_are_one_operation_each(exported: Path):
