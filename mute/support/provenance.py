@@ -6,10 +6,10 @@ import hashlib
 import platform
 from pathlib import Path
 
-import git
 import torch
 
 from mute.support.errors import MuteError
+from mute.support.quiet_git import import_git
 from mute.support.threads import usable_cores
 
 __all__ = ["REPOSITORY", "current_commit", "file_sha256", "machine_kind"]
@@ -19,16 +19,18 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 def current_commit() -> str:
-    """Return the commit of the working tree, with '-dirty' if it differs; 'unknown' outside git.
+    """Return the commit of the working tree, with '-dirty' if it differs.
 
+    It is 'unknown' outside a working tree, and where there is no git program to look at one.
     Files in `docs`, where results are written one after the other, may differ: no result depends on
     them.
     """
+    git = import_git()
     try:
         repository = git.Repo(REPOSITORY)
         suffix = "-dirty" if repository.is_dirty(path=":(exclude)docs") else ""
         return f"{repository.head.commit.hexsha}{suffix}"
-    except (git.GitError, ValueError):
+    except (git.GitError, OSError, ValueError):
         return "unknown"
 
 
