@@ -61,10 +61,17 @@ _FOUND = torch.get_num_threads(), torch.get_float32_matmul_precision()
 
 
 @pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers() -> int:
-    """Return how many processes `-n auto` means: a core for each, up to a limit."""
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Return how many processes `-n auto` means: one a core, within limits; 0 for none of its own.
+
+    A file's tests stay together, so that what names files needs no more processes than files.
+    """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return min(cores or 1, _MOST_WORKERS)
+    workers = min(cores or 1, _MOST_WORKERS)
+    places = {argument.split("::")[0] for argument in config.args}
+    if all(place.endswith(".py") for place in places):
+        workers = min(workers, len(places))
+    return workers if workers > 1 else 0
 
 
 @pytest.fixture(autouse=True, scope="session")
