@@ -6,6 +6,7 @@ the memory as they are.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import sys
 from typing import NoReturn
@@ -13,6 +14,7 @@ from typing import NoReturn
 from mute.rendering.backend import configure_rendering
 from mute.support.errors import run_cli
 from mute.support.memory import keep_freed_memory
+from mute.support.streams import patient_output
 from mute.support.threads import configure_threads
 
 __all__ = [
@@ -31,7 +33,7 @@ __all__ = [
 def train() -> NoReturn:
     """Learn a task: `train.py`."""
     keep_freed_memory()
-    _start("train")
+    _start("train", keeps_files=True)
 
 
 def play() -> NoReturn:
@@ -41,12 +43,12 @@ def play() -> NoReturn:
 
 def evaluate() -> NoReturn:
     """Measure policies: `evaluate.py`."""
-    _start("evaluate", renders=True)
+    _start("evaluate", renders=True, keeps_files=True)
 
 
 def export() -> NoReturn:
     """Export a policy as one ONNX file: `python -m mute.export`."""
-    _start("export")
+    _start("export", keeps_files=True)
 
 
 def meter() -> NoReturn:
@@ -56,18 +58,18 @@ def meter() -> NoReturn:
 
 def calibrate() -> NoReturn:
     """Fit the gains of the sound model: `python -m mute.acoustics.calibration`."""
-    _start("calibrate")
+    _start("calibrate", keeps_files=True)
 
 
 def benchmark() -> NoReturn:
     """Measure the speed of training: `python -m mute.benchmark`."""
     keep_freed_memory()
-    _start("benchmark")
+    _start("benchmark", keeps_files=True)
 
 
 def release() -> NoReturn:
     """Make the files of a policy that ships: `python -m mute.release`."""
-    _start("release")
+    _start("release", keeps_files=True)
 
 
 def card() -> NoReturn:
@@ -75,13 +77,20 @@ def card() -> NoReturn:
     _start("card")
 
 
-def _start(command: str, renders: bool = False) -> NoReturn:
-    """Run the main function of a command's module and end the process with its status."""
+def _start(command: str, renders: bool = False, keeps_files: bool = False) -> NoReturn:
+    """Run the main function of a command's module and end the process with its status.
+
+    Args:
+        command: Name of the module.
+        renders: Whether it may make pictures.
+        keeps_files: Whether it works for files, and so goes on where nobody reads what it prints.
+    """
 
     def main() -> int | None:
         configure_threads()  # before torch is imported
         if renders:
             configure_rendering(sys.argv[1:])  # before mujoco is
-        return importlib.import_module(f"mute.command_lines.{command}").main()
+        with patient_output() if keeps_files else contextlib.nullcontext():
+            return importlib.import_module(f"mute.command_lines.{command}").main()
 
     run_cli(main)

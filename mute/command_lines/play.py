@@ -49,9 +49,11 @@ from mute.live.keys import KEYS_HELP
 from mute.rendering.backend import has_display, why_no_window
 from mute.rendering.sound_track import temporary_sound
 from mute.rendering.video import Video
-from mute.support.errors import EXIT_INTERRUPTED, MuteError
+from mute.support.errors import MuteError
 from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
+from mute.support.signals import exit_status
+from mute.support.streams import patient_output
 from mute.support.threads import use_collection_threads
 from mute.tasks import DEFAULT_TASK, make_task
 
@@ -158,17 +160,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     args = parse(PlayArgs, command_line() if argv is None else argv, _DESCRIPTION)
     args.check()
-    if not args.json:
-        try:
+    # The reader of our lines, `head` say, may have had enough: that must not cost a film.
+    with patient_output() if args.video or args.wav else contextlib.nullcontext():
+        if not args.json:
             return _play(args)[1]
-        except BrokenPipeError:  # the reader of our lines, `head` say, has had enough
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return 0
-    # Whatever a library may print must not get between the reader and the object.
-    with contextlib.redirect_stdout(sys.stderr):
-        session, status = _play(args)
-    print(json.dumps(report(session), allow_nan=False))
-    return status
+        # Whatever a library may print must not get between the reader and the object.
+        with contextlib.redirect_stdout(sys.stderr):
+            session, status = _play(args)
+        print(json.dumps(report(session), allow_nan=False))
+        return status
 
 
 def _play(args: PlayArgs) -> tuple[Session, int]:
@@ -184,9 +184,9 @@ def _play(args: PlayArgs) -> tuple[Session, int]:
             _walk_on_video(args, session, args.video)
         else:
             _walk_in_text(args, session)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         print(f"interrupted after {session.seconds:.1f} s", file=sys.stderr)
-        status = EXIT_INTERRUPTED
+        status = exit_status(stop)
     if args.wav:
         _tell_sound(args.wav, session)
     if not args.json:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import shlex
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import torch
-import yaml
 
 from mute.checkpoint import (
     CheckpointError,
@@ -33,17 +31,25 @@ from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.evaluation.noise_probe import NoiseProbe
 from mute.learning.displays import LiveDisplay, PlainDisplay
 from mute.learning.distributed import Ranks, joined_ranks
+from mute.learning.run_directory import (
+    claim_run,
+    give_up_run,
+    last_saved,
+    plan_run,
+    program_name,
+    resume_hint,
+    started_command,
+    write_parameters,
+)
 from mute.learning.runner import MuteRunner, Progress
-from mute.support.errors import EXIT_INTERRUPTED, MuteError
-from mute.support.files import replace_file
-from mute.support.provenance import current_commit, machine_kind
+from mute.support.errors import MuteError
+from mute.support.files import DiskError
 from mute.tasks import DEFAULT_TASK, make_task
 
 __all__ = ["main"]
 
 _GPU_ENVS = 4096
 """Environments of `go1_mute` on a GPU; its own 1024 suit a CPU."""
-_PARAMETERS = "config.yaml"
 
 
 @dataclass
@@ -82,19 +88,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         MuteError: If an argument is bad, a checkpoint cannot be used, or a rank is gone.
     """
+    program = program_name(argv)
     argv = command_line() if argv is None else list(argv)
     with joined_ranks() as ranks:
-        return _learn(argv, ranks)
+        return _learn(argv, ranks, started_command(ranks, program))
 
 
-def _learn(argv: Sequence[str], ranks: Ranks) -> int:
+def _learn(argv: Sequence[str], ranks: Ranks, command: Sequence[str]) -> int:
     start = ranks.broadcast(time.strftime("%Y-%m-%d_%H-%M-%S"))
     with ranks.together():
         args, checkpoint = _arguments(argv)
         cfg = _configuration(args)
         kind = resolve_device(args.device)
         torch.set_float32_matmul_precision(cfg.agent.matmul_precision)
-        run_dir = checkpoint.parent if checkpoint else _new_run(args, start)
+        runs = args.log_dir / args.task
+        run_dir = checkpoint.parent if checkpoint else plan_run(runs, args.run_name, start)
         display = PlainDisplay() if args.plain or not ranks.first else LiveDisplay(args.task)
         if cfg.env.engine == "warp" or (cfg.env.engine == "auto" and kind == "cuda"):
             _say(ranks, "Warp compiles its kernels at their first use, for a minute or more")
@@ -105,8 +113,10 @@ def _learn(argv: Sequence[str], ranks: Ranks) -> int:
     ranks.check_equal("configuration or checkpoint", same)
     with ranks.together():
         if ranks.first:
-            _make_directory(run_dir)
-            _write_parameters(run_dir, args, cfg, [*ranks.launcher.split(), "train.py", *argv])
+            written = [*command[:-1], Path(command[-1]).name, *argv]
+            run_dir = _begin_run(args, cfg, run_dir, written)
+    run_dir = ranks.broadcast(run_dir)
+    runner.keep_in(run_dir)
     if checkpoint and runner.robots_anew:
         _say(
             ranks,
@@ -114,27 +124,50 @@ def _learn(argv: Sequence[str], ranks: Ranks) -> int:
             "curricula go on, robots begin anew",
         )
     _say(ranks, f"run: {run_dir}")
-    goes_on = f"{ranks.launcher} train.py --task {args.task} --resume"
-    with display, ranks.watched(lambda: _last_saved(run_dir, goes_on)):
-        finished = runner.train()
+    finished = _train(runner, ranks, display, lambda: last_saved(run_dir, command, args.task))
     path = runner.checkpoint_path()
     _say(ranks, f"{'saved' if finished else 'interrupted, saved'}: {path}")
     if not finished:
-        _say(ranks, f"go on with: {goes_on} {path}")
-        return EXIT_INTERRUPTED
+        _say(ranks, f"go on with: {resume_hint(command, args.task, path)}")
+        return runner.stop.exit_status
     return 0
+
+
+def _begin_run(args: TrainArgs, cfg: TaskCfg, run_dir: Path, command: Sequence[str]) -> Path:
+    """Make the directory of a new run, or go on in that of an old one; return it."""
+    if args.resume is not None:
+        write_parameters(run_dir, args.task, cfg, command, resumed=True)
+        return run_dir
+    run_dir = claim_run(run_dir, named=bool(args.run_name))
+    try:
+        write_parameters(run_dir, args.task, cfg, command, resumed=False)
+    except BaseException:
+        give_up_run(run_dir)
+        raise
+    return run_dir
+
+
+def _train(
+    runner: MuteRunner,
+    ranks: Ranks,
+    display: LiveDisplay | PlainDisplay,
+    advice: Callable[[], str],
+) -> bool:
+    """Learn; return False if interrupted.
+
+    Raises:
+        MuteError: If the disk refuses, or a rank is gone; it says from where to go on.
+    """
+    try:
+        with display, ranks.watched(advice):
+            return runner.train()
+    except (CheckpointError, DiskError) as error:
+        raise MuteError(f"{error}; {advice()}") from error
 
 
 def _say(ranks: Ranks, line: str) -> None:
     if ranks.first:
         print(line, file=sys.stderr)
-
-
-def _last_saved(run_dir: Path, goes_on: str) -> str:
-    newest = newest_checkpoint(run_dir)
-    if newest is None:
-        return "no checkpoint has been saved yet"
-    return f"the last checkpoint is whole, go on with: {goes_on} {newest}"
 
 
 def _make_runner(
@@ -225,43 +258,3 @@ def _configuration(args: TrainArgs) -> TaskCfg:
         )
     except ValueError as error:
         raise MuteError(str(error)) from error
-
-
-def _new_run(args: TrainArgs, start: str) -> Path:
-    """Return the directory of a new run, which is made once everything else has gone well."""
-    name = args.run_name or start
-    if Path(name).name != name or name == "..":
-        raise MuteError(f"--run-name must be a plain name without '/', got {name!r}")
-    run_dir = args.log_dir / args.task / name
-    if (run_dir / _PARAMETERS).exists() or list(run_dir.glob("model_*.pt")):
-        raise MuteError(
-            f"{run_dir} holds a run already: choose another --run-name, or go on with "
-            f"--resume {run_dir}/model_N.pt"
-        )
-    return run_dir
-
-
-def _make_directory(run_dir: Path) -> None:
-    try:
-        run_dir.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise MuteError(f"--log-dir: cannot make {run_dir}: {error.strerror}") from error
-
-
-def _write_parameters(run_dir: Path, args: TrainArgs, cfg: TaskCfg, command: Sequence[str]) -> None:
-    """Write what the run is re-made from, before it starts or goes on.
-
-    The command that started it stays; those that went on are listed under `resumed`.
-    """
-    path = run_dir / _PARAMETERS
-    origin: dict[str, Any] = {
-        "command": shlex.join(command),
-        "commit": current_commit(),
-        "machine": machine_kind(),
-    }
-    if args.resume is not None and path.exists():
-        before = yaml.safe_load(path.read_text())
-        resumed = [*before.get("resumed", []), origin]
-        origin = {name: before.get(name) for name in origin} | {"resumed": resumed}
-    content = {"task": args.task, **origin, **to_plain(cfg)}
-    replace_file(path, yaml.safe_dump(content, sort_keys=False).encode())

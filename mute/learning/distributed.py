@@ -26,7 +26,8 @@ import torch.distributed
 from rsl_rl.utils import reduce_gradients_in_buckets
 
 from mute.checkpoint import first_line
-from mute.support.errors import EXIT_INTERRUPTED, EXIT_USER_ERROR, MuteError
+from mute.support.errors import EXIT_USER_ERROR, MuteError
+from mute.support.signals import STOP_SIGNALS, exit_status
 
 __all__ = ["Ranks", "joined_ranks"]
 
@@ -199,7 +200,7 @@ class Ranks:
 
     def _end(self, advice: Callable[[], str]) -> None:
         # torchrun ends the ranks that are left; they do so themselves, with a word on why.
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in STOP_SIGNALS:
             signal.signal(number, signal.SIG_IGN)
         here = self.processes[self.rank][0]
         local = [rank for rank, (machine, _) in enumerate(self.processes) if machine == here]
@@ -247,10 +248,10 @@ def joined_ranks() -> Iterator[Ranks]:
         ranks = dataclasses.replace(ranks, processes=tuple(ranks.broadcast(ranks.gather(process))))
         with ranks.watched(lambda: "nothing has been learnt yet"), _quiet_unless(ranks.first):
             yield ranks
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         if ranks.first:
             raise
-        raise SystemExit(EXIT_INTERRUPTED) from None
+        raise SystemExit(exit_status(stop)) from None
     finally:
         if torch.distributed.is_initialized():
             torch.distributed.destroy_process_group()

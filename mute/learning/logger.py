@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import json
+import logging
 import statistics
+import threading
 import time
+import traceback
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +25,14 @@ from rsl_rl.utils.logger import Logger
 from torch.utils.tensorboard import SummaryWriter
 
 from mute.learning.distributed import Ranks
-from mute.support.files import replace_file
+from mute.support.files import told_of_file, write_file
 
-__all__ = ["CurveWriter", "MeanCurves", "TrainingLogger"]
+__all__ = ["CurveWriter", "MeanCurves", "TrainingLogger", "quiet_writer_thread"]
+
+_LOG = logging.getLogger(__name__)
+
+_CLOCK_TICK = 0.05
+"""What a file's time may be behind the clock, s."""
 
 
 class CurveWriter(LogWriter):
@@ -36,12 +45,16 @@ class CurveWriter(LogWriter):
             log_dir: Directory of the run.
             first_iteration: Iteration that logging goes on with; what the files hold from it on was
                 logged by a run that ended without saving it, and is dropped.
+
+        Raises:
+            DiskError: If a file cannot be written, or the old curves not be read.
         """
-        _outlast_second_of_newest(Path(log_dir))
-        self._tensorboard = SummaryWriter(
-            log_dir=log_dir, purge_step=first_iteration or None, flush_secs=10
-        )
-        self._path = Path(log_dir) / "curves.jsonl"
+        self._log_dir = Path(log_dir)
+        self._path = self._log_dir / "curves.jsonl"
+        with told_of_file(self._path):
+            _outlast_second_of(self._path)
+        with self._tensorboards():
+            self._tensorboard = SummaryWriter(log_dir=log_dir, purge_step=first_iteration or None)
         _drop_from(self._path, first_iteration)
         self.latest: dict[str, float] = {}
         """The current iteration's scalars by tag."""
@@ -52,18 +65,30 @@ class CurveWriter(LogWriter):
         if tag.endswith("/time"):
             return
         self.latest[tag] = float(scalar_value)
-        self._tensorboard.add_scalar(tag, scalar_value, global_step)
+        with self._tensorboards():
+            self._tensorboard.add_scalar(tag, scalar_value, global_step)
 
     def end_iteration(self, iteration: int) -> dict[str, float]:
-        """Append the iteration's scalars to the file and return them."""
+        """Write the iteration's scalars out to both files and return them.
+
+        Raises:
+            DiskError: If a file cannot be written.
+        """
         scalars, self.latest = self.latest, {}
-        with self._path.open("a") as file:
+        with told_of_file(self._path), self._path.open("a") as file:
             file.write(json.dumps({"iteration": iteration, **scalars}) + "\n")
+        with self._tensorboards():
+            # Its thread says of what it could not write when it is next asked; closing does not.
+            self._tensorboard.flush()
         return scalars
 
     def stop(self) -> None:
         """Close the files."""
-        self._tensorboard.close()
+        with self._tensorboards():
+            self._tensorboard.close()
+
+    def _tensorboards(self) -> contextlib.AbstractContextManager[None]:
+        return told_of_file(self._log_dir, "write TensorBoard's curves in")
 
 
 class MeanCurves(LogWriter):
@@ -130,8 +155,13 @@ class TrainingLogger(Logger):
         self._ranks = ranks
 
     def init_logging_writer(self) -> None:
-        """Open the curves, quietly."""
-        with contextlib.redirect_stdout(io.StringIO()):
+        """Open the curves, quietly.
+
+        Raises:
+            DiskError: If a file cannot be written.
+        """
+        place = told_of_file(Path(self.log_dir or "."), "write in")
+        with contextlib.redirect_stdout(io.StringIO()), place:
             super().init_logging_writer()
         if self._ranks.several and self.log_dir is not None:
             curves = self.writer if isinstance(self.writer, CurveWriter) else None
@@ -174,28 +204,82 @@ class TrainingLogger(Logger):
         self.tot_timesteps, self.tot_time = state["total_steps"], state["total_time"]
 
 
-def _outlast_second_of_newest(log_dir: Path) -> None:
+@contextlib.contextmanager
+def quiet_writer_thread() -> Iterator[None]:
+    """Keep the thread that writes for TensorBoard from printing what it meets on the disk.
+
+    It hands that on to the next call of its writer, where it becomes one line.
+    """
+    report = threading.excepthook
+
+    def tell(args: threading.ExceptHookArgs) -> None:
+        if not (isinstance(args.exc_value, OSError) and _passes_tensorboard(args.exc_value)):
+            report(args)
+
+    threading.excepthook = tell
+    try:
+        yield
+    finally:
+        threading.excepthook = report
+
+
+def _passes_tensorboard(error: BaseException) -> bool:
+    frames = (frame for frame, _ in traceback.walk_tb(error.__traceback__))
+    return any(str(frame.f_globals.get("__name__")).startswith("tensorboard.") for frame in frames)
+
+
+def _outlast_second_of(curves: Path) -> None:
     """Wait, a second at most, until a new event file's name comes after all that are there.
 
     TensorBoard reads a run's files in the order of their names, which begin with the second of
-    their making and go on with the process. A run that is resumed within that second could be read
-    before what it continues, and what it drops would show again.
+    their making and go on with the machine and the process. A run that is resumed within that
+    second could be read before what it continues, and what it drops would show again. The curves
+    were last written after the newest event file was made.
     """
-    made = {path.name.split(".")[3] for path in log_dir.glob("events.out.tfevents.*")}
-    while f"{int(time.time()):010d}" in made:
+    if not curves.exists():
+        return
+    written = curves.stat().st_mtime + _CLOCK_TICK
+    deadline = time.monotonic() + 1.0
+    while int(time.time()) <= int(written) and time.monotonic() < deadline:
         time.sleep(0.01)
 
 
 def _drop_from(path: Path, first_iteration: int) -> None:
     """Keep the lines before an iteration; a line that a killed process cut short goes as well.
 
-    The new file takes the place of the old one whole, so that a full disk costs no curves.
+    The new file takes the place of the old one whole, so that a full disk costs no curves. Where
+    more is damaged than the last line, the old one is kept beside it, and that is told.
+
+    Raises:
+        DiskError: If the file cannot be read or written.
     """
     if not path.exists():
         return
-    kept = []
-    for line in path.read_text().splitlines(keepends=True):
-        with contextlib.suppress(ValueError):
-            if json.loads(line)["iteration"] < first_iteration:
-                kept.append(line)
-    replace_file(path, "".join(kept).encode())
+    with told_of_file(path, "read"):
+        content = path.read_bytes()
+    *lines, cut_short = content.split(b"\n")
+    lines += [cut_short] if _iteration_of(cut_short) is not None else []
+    iterations = [_iteration_of(line) for line in lines]
+    if None in iterations:
+        old = _free_name(path.with_name("curves.damaged.jsonl"))
+        write_file(old, content)
+        count = iterations.count(None)
+        _LOG.warning("%s: %d damaged lines are left out; %s has them all", path, count, old)
+    pairs = zip(lines, iterations, strict=True)
+    kept = [line + b"\n" for line, own in pairs if own is not None and own < first_iteration]
+    write_file(path, b"".join(kept))
+
+
+def _free_name(path: Path) -> Path:
+    names = (path.with_stem(f"{path.stem}-{number}") for number in itertools.count(1))
+    return next(name for name in itertools.chain([path], names) if not name.exists())
+
+
+def _iteration_of(line: bytes) -> int | None:
+    """Return which iteration a line of the curves is of; None if it is damaged."""
+    try:
+        content = json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+    iteration = content.get("iteration") if isinstance(content, dict) else None
+    return iteration if type(iteration) is int and iteration >= 0 else None

@@ -5,10 +5,8 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import io
-import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import torch
@@ -23,8 +21,9 @@ from mute.learning.algorithm import EstimatorPPO
 from mute.learning.distributed import Ranks
 from mute.learning.estimated_env import EstimatedEnv, make_estimator
 from mute.learning.estimator_trainer import EstimatorTrainer
-from mute.learning.logger import TrainingLogger
+from mute.learning.logger import TrainingLogger, quiet_writer_thread
 from mute.learning.symmetry import groups, tie_actor_critic, tie_estimator
+from mute.support.signals import StopRequest
 from mute.support.threads import core_share, use_collection_threads
 
 __all__ = ["MuteRunner", "NoiseProbe", "Progress", "policy_part"]
@@ -111,15 +110,25 @@ class MuteRunner(OnPolicyRunner):
         self.robots_anew = True
         """Whether robots begin their first episodes, as they do unless `load` finds them saved."""
         self._on_iteration = on_iteration
-        self._stop_requested = False
+        # With several ranks a second Ctrl-C says no more: torchrun passes on what a rank may have
+        # had already, and ends by force what does not end by itself. It also signals the ranks
+        # that are left when one is gone, which shall not keep them from saying so: there, requests
+        # are taken to the end of the process.
+        self.stop = StopRequest(lasting=self.ranks.several)
+        """The signal that interrupts `train`."""
 
     def train(self) -> bool:
         """Learn until the configured number of iterations; return False if interrupted.
 
-        Ctrl-C ends the current iteration, saves and returns; a second one ends at once.
+        Ctrl-C, or another signal that asks to end, ends the current iteration, saves and returns; a
+        second Ctrl-C ends at once, unless a checkpoint is being saved.
+
+        Raises:
+            CheckpointError: If a checkpoint cannot be written.
+            DiskError: If curves cannot be written.
         """
         left = self.task_cfg.agent.iterations - self.current_learning_iteration
-        with self._catch_interrupt():
+        with self.stop, quiet_writer_thread():
             try:
                 self._agree()
                 self.learn(left, init_at_random_ep_len=self.robots_anew)
@@ -142,6 +151,10 @@ class MuteRunner(OnPolicyRunner):
 
     def save(self, path: str, infos: dict | None = None) -> None:
         """Save all that is needed to continue bit for bit, atomically; the first rank writes."""
+        with self.stop.finishing():
+            self._save(Path(path), infos)
+
+    def _save(self, path: Path, infos: dict | None) -> None:
         own = self._own_state()
         payload = self.alg.save() | own
         if self.ranks.several:
@@ -151,8 +164,12 @@ class MuteRunner(OnPolicyRunner):
         if not self.ranks.first:
             return
         payload |= self._about(self.current_learning_iteration) | {"infos": infos}
-        save_checkpoint(Path(path), payload)
-        self.logger.save_model(path, self.current_learning_iteration)
+        save_checkpoint(path, payload)
+        self.logger.save_model(str(path), self.current_learning_iteration)
+
+    def keep_in(self, directory: Path) -> None:
+        """Keep what is learnt in another directory than the one named first; before `train`."""
+        self.logger.log_dir = str(directory)
 
     def load(
         self,
@@ -220,7 +237,7 @@ class MuteRunner(OnPolicyRunner):
             # Between two trials the display goes on showing the last one's levels.
             self._on_iteration(iteration, total, self._levels | scalars)
         # A signal may reach one rank alone, or another one an iteration later.
-        if self.ranks.any(self._stop_requested) and iteration + 1 < total:
+        if self.ranks.any(self.stop.number is not None) and iteration + 1 < total:
             raise _StopTraining
 
     def _configure_multi_gpu(self) -> None:
@@ -255,30 +272,6 @@ class MuteRunner(OnPolicyRunner):
         # A run that moves to a GPU has no state to go on from there.
         if self._on_cuda and state["cuda_random_state"] is not None:
             torch.cuda.set_rng_state(state["cuda_random_state"], self.device)
-
-    @contextlib.contextmanager
-    def _catch_interrupt(self) -> Iterator[None]:
-        """Turn the first SIGINT or SIGTERM into a request heeded at the end of the iteration.
-
-        With several ranks a second one says no more: torchrun passes on what a rank may have had
-        already, and ends by force what does not end by itself. It also signals the ranks that are
-        left when one is gone, which shall not keep them from saying so: there, requests are taken
-        to the end of the process.
-        """
-
-        def request(signum: int, frame: FrameType | None) -> None:
-            if self._stop_requested and not self.ranks.several:
-                raise KeyboardInterrupt
-            self._stop_requested = True
-
-        signals = (signal.SIGINT, signal.SIGTERM)
-        previous = {number: signal.signal(number, request) for number in signals}
-        try:
-            yield
-        finally:
-            if not self.ranks.several:
-                for number, handler in previous.items():
-                    signal.signal(number, handler)
 
 
 def _own_share(cfg: QuadrupedEnvCfg, ranks: Ranks) -> QuadrupedEnvCfg:

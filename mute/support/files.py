@@ -1,12 +1,47 @@
-"""Files that are replaced whole or not at all."""
+"""Files that are replaced whole or not at all, and one line where the system refuses."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
-__all__ = ["replace_file"]
+from mute.support.errors import MuteError
+
+__all__ = ["DiskError", "replace_file", "told_of_file", "write_file"]
+
+
+class DiskError(MuteError):
+    """A file that cannot be written or read: a full disk, a directory without permission."""
+
+
+@contextlib.contextmanager
+def told_of_file(path: Path, action: str = "write") -> Iterator[None]:
+    """Turn what the system says of a file into one line.
+
+    Args:
+        path: The file.
+        action: What is done with it in here.
+
+    Raises:
+        DiskError: Where the system refuses.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise DiskError(f"cannot {action} {path}: {error.strerror or error}") from error
+
+
+def write_file(path: Path, data: bytes) -> None:
+    """Write a file, whole or not at all; its directory is made if need be.
+
+    Raises:
+        DiskError: If it cannot be written.
+    """
+    with told_of_file(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(path, data)
 
 
 def replace_file(path: Path, data: bytes | memoryview) -> None:

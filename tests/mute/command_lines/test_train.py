@@ -14,6 +14,7 @@ import torch
 import yaml
 from places import REPOSITORY
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from training_process import TINY, start_training, stop_after
 
 from mute.checkpoint import load_checkpoint, save_checkpoint
 from mute.command_lines import train
@@ -24,29 +25,6 @@ from mute.envs.rewards import TERMS
 from mute.learning.runner import policy_part
 from mute.support.errors import run_cli
 from mute.tasks import make_task
-
-TINY = ["--plain", "--num-envs", "4", "--env.num-threads", "1", "--agent.num-steps-per-env", "6"]
-TINY += ["--agent.actor-hidden", "8", "--agent.critic-hidden", "8"]
-
-
-def _start(*arguments: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "train.py", *TINY, *arguments],
-        cwd=REPOSITORY,
-        env=os.environ | {"OMP_NUM_THREADS": "1"},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
-def _stop_after(process: subprocess.Popen[str], lines: int, how: signal.Signals) -> tuple[str, str]:
-    """Wait for the lines of some iterations, send a signal, return what came out in all."""
-    assert process.stdout is not None
-    head = "".join(process.stdout.readline() for _ in range(lines))
-    process.send_signal(how)
-    out, err = process.communicate(timeout=120)
-    return head + out, err
 
 
 def _train(*arguments: str) -> int:
@@ -179,8 +157,10 @@ def test_a_second_run_of_the_same_name_is_refused_and_changes_nothing(finished, 
 
 
 def test_ctrl_c_saves_says_where_and_the_run_goes_on_from_there(tmp_path, capsys):
-    process = _start("--iterations", "100000", "--log-dir", str(tmp_path), "--run-name", "b")
-    out, err = _stop_after(process, 2, signal.SIGINT)
+    process = start_training(
+        "--iterations", "100000", "--log-dir", str(tmp_path), "--run-name", "b"
+    )
+    out, err = stop_after(process, 2, signal.SIGINT)
     assert process.returncode == 130, err
     run = tmp_path / "go1_mute" / "b"
     last = len(out.splitlines()) - 1
@@ -201,10 +181,10 @@ def test_ctrl_c_saves_says_where_and_the_run_goes_on_from_there(tmp_path, capsys
 
 
 def test_a_killed_run_leaves_whole_checkpoints_and_curves_that_go_on_without_repeating(tmp_path):
-    process = _start(
+    process = start_training(
         "--iterations", "100000", "--agent.save-interval", "1", "--log-dir", str(tmp_path)
     )
-    out, _ = _stop_after(process, 4, signal.SIGKILL)
+    out, _ = stop_after(process, 4, signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL
     (run,) = (tmp_path / "go1_mute").iterdir()
     checkpoints = sorted(run.glob("model_*.pt"))

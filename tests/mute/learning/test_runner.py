@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
-import time
+from pathlib import Path
 
 import pytest
 import torch
@@ -13,8 +13,8 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from mute.checkpoint import CheckpointError, load_checkpoint, save_checkpoint
 from mute.evaluation.noise_probe import NoiseProbe
-from mute.learning.logger import CurveWriter
 from mute.learning.runner import MuteRunner, policy_part
+from mute.support.signals import STOP_SIGNALS
 from mute.tasks import make_task
 
 
@@ -170,6 +170,35 @@ def test_ctrl_c_ends_the_iteration_saves_it_and_the_rest_gives_the_same_result(w
     assert [line["iteration"] for line in _curves(tmp_path)] == [0, 1, 2, 3]
 
 
+@pytest.mark.parametrize("number", STOP_SIGNALS, ids=lambda number: number.name)
+def test_every_signal_that_asks_to_end_saves_however_often_it_comes(number, tmp_path):
+    def interrupt(iteration: int, total: int, scalars: dict[str, float]) -> None:
+        # A scheduler repeats itself; a second Ctrl-C means it.
+        for _ in range(1 if number is signal.SIGINT else 3):
+            signal.raise_signal(number)
+
+    before = [signal.getsignal(each) for each in STOP_SIGNALS]
+    runner = MuteRunner("go1_mute", make_cfg(4), tmp_path, on_iteration=interrupt)
+    assert not runner.train()
+    assert load_checkpoint(tmp_path / "model_0.pt")["iter"] == 0
+    assert runner.stop.exit_status == 128 + number
+    assert [signal.getsignal(each) for each in STOP_SIGNALS] == before
+
+
+def test_a_second_ctrl_c_does_not_prevent_that_a_checkpoint_is_saved(tmp_path, monkeypatch):
+    def interrupt(iteration: int, total: int, scalars: dict[str, float]) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    def save(path: Path, payload: dict) -> None:
+        signal.raise_signal(signal.SIGINT)
+        save_checkpoint(path, payload)
+
+    monkeypatch.setattr("mute.learning.runner.save_checkpoint", save)
+    runner = MuteRunner("go1_mute", make_cfg(4), tmp_path, on_iteration=interrupt)
+    assert not runner.train()
+    assert load_checkpoint(tmp_path / "model_0.pt")["iter"] == 0
+
+
 def test_ctrl_c_during_the_last_iteration_is_a_finished_run(tmp_path):
     def interrupt(iteration: int, total: int, scalars: dict[str, float]) -> None:
         signal.raise_signal(signal.SIGTERM)
@@ -206,33 +235,6 @@ def test_without_a_directory_it_reports_is_interrupted_and_keeps_nothing(tmp_pat
         runner.checkpoint_path()
 
 
-def test_curves_logged_after_the_checkpoint_and_a_line_cut_short_are_dropped(tmp_path):
-    path = tmp_path / "curves.jsonl"
-    path.write_text('{"iteration": 0}\n{"iteration": 1}\n{"iteration": 2}\n{"iterat')
-    writer = CurveWriter(str(tmp_path), first_iteration=2)
-    writer.add_scalar("Loss/value", 0.5, 2)
-    assert writer.end_iteration(2) == {"Loss/value": 0.5}
-    writer.stop()
-    lines = [json.loads(line) for line in path.read_text().splitlines()]
-    assert lines == [{"iteration": 0}, {"iteration": 1}, {"iteration": 2, "Loss/value": 0.5}]
-
-
-def test_a_run_resumed_within_the_second_it_was_stopped_in_still_reads_in_order(tmp_path):
-    first = CurveWriter(str(tmp_path))
-    for iteration in range(4):
-        first.add_scalar("Loss/value", 1.0, iteration)
-    first.stop()
-    (written,) = tmp_path.glob("events.*")
-    # A process whose name sorts after ours, and the same second.
-    written.rename(tmp_path / f"events.out.tfevents.{int(time.time()):010d}.~host.999999.0")
-    resumed = CurveWriter(str(tmp_path), first_iteration=2)
-    for iteration in (2, 3):
-        resumed.add_scalar("Loss/value", 2.0, iteration)
-    resumed.stop()
-    events = EventAccumulator(str(tmp_path)).Reload().Scalars("Loss/value")
-    assert [(event.step, event.value) for event in events] == [(0, 1), (1, 1), (2, 2), (3, 2)]
-
-
 def test_noise_is_measured_at_its_interval_and_changes_nothing_else(tmp_path):
     ends, levels = [], []
     for name, interval in (("silent", 0), ("heard", 2)):
@@ -247,20 +249,6 @@ def test_noise_is_measured_at_its_interval_and_changes_nothing_else(tmp_path):
     assert levels[1][0::2] == [None] * 2
     # The actions of so young a policy are small: the robot stands, and its fan is heard.
     assert all(55.0 < level < 60.0 for level in levels[1][1::2])
-
-
-def test_curves_stay_whole_where_they_cannot_be_written_anew(tmp_path, monkeypatch):
-    path = tmp_path / "curves.jsonl"
-    path.write_text('{"iteration": 0}\n{"iteration": 1}\n')
-
-    def fail(source, target) -> None:
-        raise OSError("no space left on device")
-
-    monkeypatch.setattr("mute.support.files.os.replace", fail)
-    with pytest.raises(OSError, match="no space"):
-        CurveWriter(str(tmp_path), first_iteration=1)
-    assert path.read_text() == '{"iteration": 0}\n{"iteration": 1}\n'
-    assert list(tmp_path.glob("*.tmp")) == []
 
 
 def test_the_random_start_ages_come_with_a_new_run_alone(whole_run, monkeypatch):

@@ -1,0 +1,164 @@
+"""The directory of a run: its name, whose it is, its parameters, and the command that goes on."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import shlex
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from mute.checkpoint import newest_checkpoint
+from mute.config import TaskCfg, to_plain
+from mute.learning.distributed import Ranks
+from mute.support.errors import MuteError
+from mute.support.files import write_file
+from mute.support.provenance import current_commit, machine_kind
+
+__all__ = [
+    "claim_run",
+    "give_up_run",
+    "last_saved",
+    "plan_run",
+    "program_name",
+    "resume_hint",
+    "started_command",
+    "write_parameters",
+]
+
+_PARAMETERS = "config.yaml"
+_SCRIPT = "train.py"
+
+
+def plan_run(of_task: Path, run_name: str, start: str) -> Path:
+    """Return the directory of a new run, which `claim_run` makes once all else has gone well.
+
+    Args:
+        of_task: Directory of the task's runs.
+        run_name: Name that the user gave, or nothing.
+        start: Date and time, which names a run without one.
+
+    Raises:
+        MuteError: If the name is none, or a run has it.
+    """
+    name = run_name or start
+    if Path(name).name != name or name == "..":
+        raise MuteError(f"--run-name must be a plain name without '/', got {name!r}")
+    run_dir = of_task / name
+    if run_name and ((run_dir / _PARAMETERS).exists() or list(run_dir.glob("model_*.pt"))):
+        raise _is_taken(run_dir)
+    return run_dir
+
+
+def claim_run(run_dir: Path, named: bool) -> Path:
+    """Make the directory of a new run, which no other process takes for its own; return it.
+
+    Args:
+        run_dir: The directory that is planned.
+        named: Whether the user gave the name. If not, and another run has begun in the same second,
+            a number is added to it.
+
+    Raises:
+        MuteError: If a run has the name by now, or the directory cannot be made.
+    """
+    try:
+        run_dir.parent.mkdir(parents=True, exist_ok=True)
+        if not named:
+            return _make_first_free(run_dir)
+        run_dir.mkdir(exist_ok=True)
+        (run_dir / _PARAMETERS).touch(exist_ok=False)
+    except FileExistsError as error:
+        if (run_dir / _PARAMETERS).exists():
+            raise _is_taken(run_dir) from None
+        raise MuteError(f"--log-dir: cannot make {run_dir}: {error.strerror}") from error
+    except OSError as error:
+        raise MuteError(f"--log-dir: cannot make {run_dir}: {error.strerror}") from error
+    return run_dir
+
+
+def give_up_run(run_dir: Path) -> None:
+    """Remove the directory of a run that has not begun; what others have put into it stays."""
+    with contextlib.suppress(OSError):
+        (run_dir / _PARAMETERS).unlink(missing_ok=True)
+        run_dir.rmdir()
+
+
+def _make_first_free(run_dir: Path) -> Path:
+    numbered = (run_dir.with_name(f"{run_dir.name}-{number}") for number in itertools.count(1))
+    for directory in itertools.chain([run_dir], numbered):
+        with contextlib.suppress(FileExistsError):
+            directory.mkdir()
+            return directory
+    raise AssertionError("numbers do not end")
+
+
+def _is_taken(run_dir: Path) -> MuteError:
+    return MuteError(
+        f"{run_dir} holds a run already: choose another --run-name, or go on with "
+        f"--resume {shlex.quote(f'{run_dir}/model_N.pt')}"
+    )
+
+
+def write_parameters(
+    run_dir: Path, task: str, cfg: TaskCfg, command: Sequence[str], resumed: bool
+) -> None:
+    """Write what the run is re-made from, before it starts or goes on.
+
+    The command that started it stays; those that went on are listed under `resumed`.
+
+    Raises:
+        DiskError: If the file cannot be written.
+    """
+    path = run_dir / _PARAMETERS
+    origin: dict[str, Any] = {
+        "command": shlex.join(command),
+        "commit": current_commit(),
+        "machine": machine_kind(),
+    }
+    if resumed and path.exists():
+        before = yaml.safe_load(path.read_text())
+        entries = [*before.get("resumed", []), origin]
+        origin = {name: before.get(name) for name in origin} | {"resumed": entries}
+    content = {"task": task, **origin, **to_plain(cfg)}
+    write_file(path, yaml.safe_dump(content, sort_keys=False).encode())
+
+
+def started_command(ranks: Ranks, program: str) -> list[str]:
+    """Return the words that start a training as this one was started, without its options.
+
+    Args:
+        ranks: Those that torchrun has started, or this process alone.
+        program: What was run: the script, or the installed command.
+    """
+    launcher = shlex.split(ranks.launcher)
+    if program.endswith(".py"):
+        return [*launcher, program]
+    found = shutil.which(Path(program).name)
+    known = found is not None and Path(found).resolve() == Path(program).resolve()
+    command = Path(program).name if known else program
+    return [*launcher, "--no-python", command] if ranks.several else [command]
+
+
+def program_name(argv: Sequence[str] | None) -> str:
+    """Return what was run where the arguments are those of the process, else the script."""
+    if argv is None and sys.argv[0] not in ("", "-c", "-m"):
+        return sys.argv[0]
+    return _SCRIPT
+
+
+def resume_hint(command: Sequence[str], task: str, checkpoint: Path) -> str:
+    """Return the command line that goes on from a checkpoint, quoted for a shell."""
+    return shlex.join([*command, "--task", task, "--resume", str(checkpoint)])
+
+
+def last_saved(run_dir: Path, command: Sequence[str], task: str) -> str:
+    """Return in words which checkpoint of a run is the newest whole one, and how to go on."""
+    newest = newest_checkpoint(run_dir)
+    if newest is None:
+        return "no checkpoint has been saved yet"
+    return f"the last checkpoint is whole, go on with: {resume_hint(command, task, newest)}"
