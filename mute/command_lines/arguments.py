@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import os
-import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, TypeVar
 
 import tyro
 
+from mute.command_lines.parser_errors import in_one_line
 from mute.config_versions import MOVED
 from mute.support.errors import MuteError
 from mute.support.ranges import Range
@@ -73,7 +71,6 @@ LONGEST_WALK = 86400.0
 """Longest time that a robot may be asked to walk, s."""
 
 _Args = TypeVar("_Args")
-_Result = TypeVar("_Result")
 
 
 def parse(
@@ -92,7 +89,7 @@ def parse(
         return tyro.cli(args_type, args=list(argv), description=description, default=default)
 
     try:
-        return _in_one_line(read)
+        return in_one_line(read)
     except ValueError as error:
         raise MuteError(str(error)) from error
 
@@ -121,7 +118,7 @@ def selected_task(argv: Sequence[str], default: str) -> str:
         return task
 
     without_help = [word for word in argv if word not in ("-h", "--help")]
-    task, _ = _in_one_line(
+    task, _ = in_one_line(
         lambda: tyro.cli(only_task, args=without_help, return_unknown_args=True, add_help=False)
     )
     return task
@@ -243,29 +240,3 @@ def make_directory(path: Path) -> None:
 def command_line() -> list[str]:
     """Return the arguments that the program was started with."""
     return sys.argv[1:]
-
-
-def _in_one_line(parser: Callable[[], _Result]) -> _Result:
-    """Return what a parser of tyro's returns; what it prints in a box becomes a `MuteError`."""
-    box = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(box):
-            return parser()
-    except SystemExit as stop:
-        if not stop.code:
-            raise
-        raise MuteError(_first_paragraph(box.getvalue())) from None
-
-
-def _first_paragraph(box: str) -> str:
-    """Return what stands in a box of tyro's between its title and the next rule or empty line."""
-    plain = re.sub(r"\x1b\[[0-9;]*m", "", box)  # on a terminal, tyro's text is coloured
-    lines: list[str] = []
-    for line in plain.splitlines()[1:]:
-        text = line.strip("│╰╯ ")
-        if set(text) <= {"─", "-"}:
-            if lines:
-                break
-            continue  # without UTF-8, a rule follows the title
-        lines.append(text)
-    return f"{' '.join(lines).rstrip('.')}; see --help"

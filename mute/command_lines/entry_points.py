@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import io
 import sys
 from typing import NoReturn
 
@@ -87,6 +88,7 @@ def _start(command: str, renders: bool = False, keeps_files: bool = False) -> No
     """
 
     def main() -> int | None:
+        _print_what_can_be()
         configure_threads()  # before torch is imported
         if renders:
             configure_rendering(sys.argv[1:])  # before mujoco is
@@ -94,3 +96,13 @@ def _start(command: str, renders: bool = False, keeps_files: bool = False) -> No
             return importlib.import_module(f"mute.command_lines.{command}").main()
 
     run_cli(main)
+
+
+def _print_what_can_be() -> None:
+    """Print a question mark for what the terminal or the file has no character for.
+
+    A figure's unit must not cost the figures.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
