@@ -1,8 +1,8 @@
-"""Noise levels that the paper measured on the real robot at 0.5 m/s (its table of noise levels)."""
+"""Noise levels that the paper measured on the real robot, in dBA."""
 
 from __future__ import annotations
 
-__all__ = ["PAPER_LEVELS"]
+__all__ = ["PAPER_LEVELS", "PAPER_MNL_AT_08", "PAPER_WALK"]
 
 PAPER_LEVELS: dict[str, dict[str, tuple[float, float]]] = {
     "dreamwaq": {"wood": (73.51, 83.18), "carpet": (71.90, 80.80), "tile": (72.34, 80.93)},
@@ -10,4 +10,10 @@ PAPER_LEVELS: dict[str, dict[str, tuple[float, float]]] = {
     "mute beta 0": {"wood": (68.61, 75.86), "carpet": (67.42, 74.40), "tile": (70.69, 79.30)},
     "mute beta 1": {"wood": (65.78, 73.18), "carpet": (62.48, 69.52), "tile": (66.15, 76.22)},
 }
-"""(MNL, PNL) in dBA by method and floor."""
+"""(MNL, PNL) at 0.5 m/s by method and floor: the paper's table of noise levels."""
+
+PAPER_MNL_AT_08: dict[float, float] = {0.0: 77.85, 1.0: 73.18}
+"""MNL by beta on wood, asked for 0.8 m/s: the paper's analysis of the quiet factor."""
+
+PAPER_WALK: dict[str, float] = {"seconds": 256.0, "mnl": 68.25, "pnl": 76.8}
+"""The paper's long walk over mixed floors."""

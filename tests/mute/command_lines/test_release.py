@@ -1,4 +1,4 @@
-"""Tests of the files of a release and of the card that is printed from them."""
+"""Tests of the files of a release."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 from learning_helpers import make_runner
-from places import REPOSITORY
 
-from mute.command_lines import card, evaluate, release
+from mute.command_lines import evaluate, release
 from mute.evaluation.tables import read_json, write_json
 from mute.support.errors import MuteError
 
@@ -62,30 +61,6 @@ def test_a_checkpoint_outside_its_run_cannot_be_released(run, tmp_path):
     (run / "config.yaml").unlink()
     with pytest.raises(MuteError, match="outside its run"):
         release.main(["--checkpoint", str(run / "model_1.pt"), "--out", str(tmp_path)])
-
-
-def test_markdown_formats_each_column_and_leaves_a_dash_for_what_is_missing():
-    columns = {"beta": ("beta", "{:g}"), "fall_rate": ("falls", "{:.1%}")}
-    rows = [{"beta": 0.5, "fall_rate": 0.25}, {"beta": 1.0, "fall_rate": None}]
-    assert card.markdown(rows, columns).splitlines() == [
-        "| beta | falls |",
-        "| --- | --- |",
-        "| 0.5 | 25.0% |",
-        "| 1 | - |",
-    ]
-
-
-def test_a_card_that_is_missing_is_named(tmp_path):
-    with pytest.raises(MuteError, match="nowhere"):
-        card.main(["--card", str(tmp_path / "nowhere.json")])
-
-
-def test_the_readmes_tables_are_those_that_the_card_prints(capsys):
-    assert card.main([]) == 0
-    readme = (REPOSITORY / "README.md").read_text()
-    lines = [line for line in capsys.readouterr().out.splitlines() if line]
-    assert len(lines) > 40
-    assert [line for line in lines if line not in readme] == []
 
 
 def test_a_released_policy_is_small(run, tmp_path):

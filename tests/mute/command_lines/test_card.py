@@ -1,0 +1,88 @@
+"""The pages of figures are what the command makes of the files, and the front page agrees."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import pytest
+from places import REPOSITORY
+
+from mute.command_lines import card
+from mute.command_lines.card_results import results_page, summary
+from mute.command_lines.card_tables import markdown, mean_and_spread
+from mute.support.errors import MuteError
+
+
+@pytest.fixture(scope="module")
+def files():
+    return card.read_results(card.CardArgs())
+
+
+@pytest.mark.parametrize("name", ["results.md", "benchmark.md"])
+def test_a_committed_page_is_what_the_command_makes(name, tmp_path):
+    assert card.main(["--out", str(tmp_path)]) == 0
+    made, committed = (folder / name for folder in (tmp_path, REPOSITORY / "docs"))
+    assert made.read_text() == committed.read_text(), "python -m mute.card --out docs"
+
+
+def test_the_front_page_has_the_table_of_the_results_and_says_what_it_is_of(files):
+    words = " ".join((REPOSITORY / "README.md").read_text().split())
+    assert " ".join(summary(files).split()) in words
+
+
+def test_without_a_directory_both_pages_are_printed(capsys):
+    assert card.main([]) == 0
+    headings = re.findall("^# .*$", capsys.readouterr().out, re.MULTILINE)
+    assert headings == ["# Results", "# Speed"]
+
+
+def test_a_spread_is_that_of_the_trainings(files):
+    runs = list(files.all_trainings.values())
+    assert [run["at_speed"][0]["landing_speed_mean"] for run in runs] == pytest.approx(
+        [0.461, 0.369, 0.470, 0.617], abs=5e-4
+    )
+    assert "| 0 | 0 of 640 | 0.009 ± 0.001 | 0.48 ± 0.10 |" in summary(files)
+
+
+def test_a_mean_has_the_sample_standard_deviation_beside_it():
+    assert mean_and_spread([1.0, 2.0, 3.0], "{:.2f}") == "2.00 ± 1.00"
+
+
+def test_a_robot_that_fell_in_one_training_is_counted(files):
+    fallen = dict(files.trainings)
+    name, run = next(iter(fallen.items()))
+    worse = [row | {"fall_rate": 2.0 / run["trials"]} for row in run["range"]]
+    fallen[name] = {**run, "range": worse}
+    assert "| 0 | 2 of 640 |" in summary(dataclasses.replace(files, trainings=fallen))
+
+
+def test_what_the_level_loses_with_beta_is_compared_at_equal_actual_speed(files):
+    def row(beta, command, speed, level):
+        return {"beta": beta, "command_speed": command, "speed_mean": speed, "mnl_mean": level}
+
+    # Level rises by 10 dB per 1 m/s; beta 1 is 20 % slower, and 3 dB quieter at the same speed.
+    sweep = [
+        row(beta, command, share * command, 60.0 + 10.0 * share * command - quieter)
+        for beta, share, quieter in ((0.0, 1.0, 0.0), (1.0, 0.8, 3.0))
+        for command in (0.4, 0.7, 1.0)
+    ]
+    page = results_page(dataclasses.replace(files, sweep_speed=sweep))
+    assert "by 3 dB at the same actual speed" in page
+    assert "by 4 to 5 dB at the same command" in page
+
+
+def test_markdown_formats_each_column_and_leaves_a_dash_for_what_is_missing():
+    columns = {"beta": ("beta", "{:g}"), "fall_rate": ("falls", "{:.1%}")}
+    rows = [{"beta": 0.5, "fall_rate": 0.25}, {"beta": 1.0, "fall_rate": None}]
+    assert markdown(rows, columns).splitlines() == [
+        "| beta | falls |",
+        "| --- | --- |",
+        "| 0.5 | 25.0% |",
+        "| 1 | - |",
+    ]
+
+
+def test_a_file_that_is_missing_is_named(tmp_path):
+    with pytest.raises(MuteError, match="nowhere"):
+        card.main(["--card", str(tmp_path / "nowhere.json")])
