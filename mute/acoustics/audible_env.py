@@ -1,4 +1,9 @@
-"""Environments that can be heard: on a floor, with forces at the feet, at 1 ms steps."""
+"""Configurations of environments that can be heard.
+
+`listening_cfg` is for measuring: a real floor, with forces at the feet, at 1 ms steps.
+`audible_cfg` is for watching a walk: the same if a floor is named, else the walk as it is, heard if
+its own steps allow it. What does the hearing is a `Listener`.
+"""
 
 from __future__ import annotations
 

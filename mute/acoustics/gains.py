@@ -1,9 +1,13 @@
-"""The calibration that ships: one gain a floor, with where it comes from."""
+"""The calibration of the sound model that ships: one gain a floor, with where it comes from.
+
+It is fitted to levels that the paper measured. That of a recording, Pa at full scale of a real
+microphone, is in `metering.calibrator`.
+"""
 
 from __future__ import annotations
 
 import json
-import math
+import sys
 from pathlib import Path
 
 from mute.acoustics.floors import FLOORS
@@ -24,14 +28,16 @@ def load_gains(path: Path = GAINS_FILE) -> dict[str, float]:
     """
     try:
         floors = json.loads(path.read_text())["floors"]
-        gains = {name: float(floors[name]["gain"]) for name in FLOORS}
+        gains = {name: floors[name]["gain"] for name in FLOORS}
     except OSError as error:
         raise MuteError(f"cannot read the calibration {path}: {error.strerror}") from error
     except KeyError as error:
         raise MuteError(f"{path} is no calibration: {error} is missing") from error
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, RecursionError) as error:
         raise MuteError(f"{path} is no calibration: {error}") from error
     for name, gain in gains.items():
-        if not 0.0 < gain < math.inf:
-            raise MuteError(f"{path}: the gain of {name} must be > 0, got {gain}")
-    return gains
+        number = isinstance(gain, int | float) and not isinstance(gain, bool)
+        if not number or not 0.0 < gain <= sys.float_info.max:
+            shown = repr(gain) if len(repr(gain)) < 40 else f"{repr(gain)[:37]}..."
+            raise MuteError(f"{path}: the gain of {name} must be a number > 0, got {shown}")
+    return {name: float(gain) for name, gain in gains.items()}

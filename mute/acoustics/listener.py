@@ -1,4 +1,4 @@
-"""Robots that are heard as they walk: recorder, sound and meter in one.
+"""Robots that are heard as they walk: recorder, soundscape and meter in one.
 
 A `Listener` follows an environment step by step. It works in stretches, so that its memory does
 not grow with the walk but for the readings of the level, and the sound of robots can be kept as

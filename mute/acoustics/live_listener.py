@@ -1,7 +1,8 @@
 """A walk that is heard as it goes: the level of the first robot, and its sound if it is kept.
 
-Levels are modelled (`mute.acoustics`) and always come from the cheap path, so that keeping the
-sound changes no figure. Tables of many trials are `mute.evaluation`'s.
+A `LiveListener` is a `Listener` of one robot, set up for a window or for lines of text. Levels are
+modelled (`mute.acoustics`) and always come from the cheap path, so that keeping the sound changes
+no figure. Tables of many trials are `mute.evaluation`'s.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From physics to sound: what an environment's robots do, read at every physics step.
+"""What an environment's robots do, copied at every physics step; the sound is made of it later.
 
 Nothing is sampled at the control rate: an impact is over within a control step. The recorder only
 copies while the physics runs; a block is worked out when it is taken.

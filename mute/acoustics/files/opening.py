@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 from mute.support.errors import MuteError
 
-__all__ = ["open_recording"]
+__all__ = ["open_seekable"]
 
 _MOST_PIPED = 1 << 32
 """Bytes that are taken from a pipe: 12 hours of 16 bits at 48 kHz."""
@@ -19,7 +19,7 @@ _AT_ONCE = 1 << 20
 """Bytes that are copied at a time."""
 
 
-def open_recording(path: Path, beginnings: tuple[bytes, ...]) -> BinaryIO:
+def open_seekable(path: Path, beginnings: tuple[bytes, ...]) -> BinaryIO:
     """Open a recording; what comes through a pipe is kept in a nameless temporary file.
 
     Args:

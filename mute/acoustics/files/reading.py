@@ -20,7 +20,7 @@ import soundfile
 from numpy.typing import NDArray
 
 from mute.acoustics.files.mending import BEGINNINGS, MendedFile, find_layout
-from mute.acoustics.files.opening import open_recording
+from mute.acoustics.files.opening import open_seekable
 from mute.support.errors import MuteError
 
 __all__ = ["WavReader", "read_wav"]
@@ -63,7 +63,7 @@ class WavReader:
         """
         self.path = path
         with contextlib.ExitStack() as opened:
-            file = opened.enter_context(open_recording(path, BEGINNINGS))
+            file = opened.enter_context(open_seekable(path, BEGINNINGS))
             try:
                 self._layout = find_layout(file, path)
             except OSError as error:

@@ -1,7 +1,7 @@
 """A sound level meter for arrays: A-weighting, Fast or Slow detector, statistics.
 
 It is the same for a robot in simulation and for a real recording, and knows nothing of either;
-files and the command line are those of `meter`.
+files are those of `wav_levels`.
 """
 
 from __future__ import annotations

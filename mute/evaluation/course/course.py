@@ -6,6 +6,7 @@ is left to `path_following`, the walk itself to `walk`.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -32,6 +33,16 @@ length."""
 
 _MAX_COORDINATE = 1e4
 """Largest coordinate of a point, m: beyond, the physics would lose precision."""
+
+
+_NOT_YAML = (
+    yaml.YAMLError,
+    RecursionError,
+    # What PyYAML lets through of a month 13, `!!int x` or `!!timestamp x`.
+    ValueError,
+    AttributeError,
+)
+"""What reading a file raises that is no YAML."""
 
 
 class _FieldError(ValueError):
@@ -108,7 +119,7 @@ def load_course(path: Path) -> Course:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise MuteError(f"cannot read the course {path}: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except _NOT_YAML as error:
         reason = " ".join(str(error).split())
         raise MuteError(f"{path} is no YAML file: {reason}") from error
     try:
@@ -219,9 +230,12 @@ def _point(name: str, value: Any) -> Point:  # noqa: ANN401
 
 def _number(name: str, value: Any) -> float:  # noqa: ANN401
     # YAML's yes and no are numbers to Python.
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise _FieldError(f"{name} must be a finite number, got {_shown(value)}")
-    return float(value)
+    if not isinstance(value, bool) and isinstance(value, int | float):
+        with contextlib.suppress(OverflowError):  # of an integer beyond all floats
+            number = float(value)
+            if math.isfinite(number):
+                return number
+    raise _FieldError(f"{name} must be a finite number, got {_shown(value)}")
 
 
 def _shown(value: Any) -> str:  # noqa: ANN401

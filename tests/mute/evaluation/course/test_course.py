@@ -101,6 +101,7 @@ def test_a_floor_that_comes_twice_has_one_index():
         ({"speed": 1.5}, "speed must be above 0 and at most 1 m/s, got 1.5"),
         ({"speed": True}, "speed must be a finite number, got True"),
         ({"speed": float("nan")}, "speed must be a finite number, got nan"),
+        ({"speed": 10**400}, r"speed must be a finite number, got 10{56}\.\.\."),
         ({"path": [[0, 0]]}, r"path must be a list of 2 or more, got \[\[0, 0\]\]"),
         ({"path": [[0, 0], [1]]}, r"path\[1\] must be two numbers \[x, y\] in m, got \[1\]"),
         ({"path": [[0, 0], [1, "b"]]}, r"path\[1\] must be a finite number, got 'b'"),
@@ -143,7 +144,20 @@ def test_a_missing_field_is_named(tmp_path):
         load_course(_write(tmp_path, content))
 
 
-@pytest.mark.parametrize("text", ["path: [", "a: !!python/object:os.system {}", "\x00"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "path: [",
+        "a: !!python/object:os.system {}",
+        "\x00",
+        "[" * 5000,
+        "speed: 2020-13-45",
+        "speed: 0b_",
+        "speed: !!int x",
+        "speed: !!timestamp x",
+        "speed: " + "9" * 5000,
+    ],
+)
 def test_what_is_no_yaml_is_refused_in_one_line(tmp_path, text):
     with pytest.raises(MuteError, match="is no YAML file") as error:
         load_course(_write(tmp_path, text))
