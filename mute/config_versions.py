@@ -6,14 +6,63 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import asdict
 from typing import Any
 
-__all__ = ["MOVED", "check_resumable", "upgraded"]
+from mute.envs.rewards import RewardTermCfg, paper_terms, reward_term
 
-MOVED: dict[str, str] = {
+__all__ = ["MOVED", "check_resumable", "earlier_terms", "upgraded"]
+
+
+_EARLIER_NAMES = (
+    "lin_vel_tracking",
+    "ang_vel_tracking",
+    "foot_drop_velocity",
+    "foot_raise_velocity",
+    "near_ground_drop",
+    "landing_speed",
+    "lin_vel_z",
+    "ang_vel_xy",
+    "joint_power",
+    "joint_acc",
+    "action_rate",
+    "collision",
+    "base_height",
+    "orientation",
+    "smoothness",
+    "power_distribution",
+    "foot_clearance",
+    "touchdown_apex",
+    "foot_slip",
+    "stand_still",
+    "tilt",
+    "fall",
+    "diagonal_support",
+)
+
+
+def earlier_terms() -> dict[str, RewardTermCfg]:
+    """Return every term that a reward had while weights were fields, with that field's default."""
+    terms = paper_terms()
+    for name in _EARLIER_NAMES:
+        if name == "tilt":  # it was a function of its own, to stand in another group
+            terms[name] = reward_term("orientation", 0.0, group="lift")
+        elif name not in terms:
+            terms[name] = reward_term(name, 0.0)
+    return {name: terms[name] for name in _EARLIER_NAMES}
+
+
+_WEIGHTS = {f"env.rewards.{name}": f"env.rewards.terms.{name}.weight" for name in _EARLIER_NAMES}
+_CONSTANTS = {
+    "env.rewards.desired_height": "env.rewards.terms.base_height.params.desired",
+    "env.rewards.clearance_target": "env.rewards.terms.foot_clearance.params.target",
+    "env.rewards.apex_target": "env.rewards.terms.touchdown_apex.params.target",
+}
+_HEIGHTS = {
     "agent.estimation.network.height_offset": "env.height_map.offset",
     "agent.estimation.network.height_scale": "env.height_map.scale",
 }
+MOVED: dict[str, str] = _WEIGHTS | _CONSTANTS | _HEIGHTS
 """Where the fields of earlier configurations are now, as paths."""
 
 _CRITICS_HEIGHTS = {"height_offset": 0.30, "height_scale": 0.1}
@@ -26,8 +75,12 @@ def upgraded(data: dict[str, Any]) -> dict[str, Any]:
     What is in it already, or fits neither form, stays as it is.
     """
     data = copy.deepcopy(data)
-    for old, new in MOVED.items():
+    rewards = _mapping(data, ["env", "rewards"])
+    flat = rewards is not None and "terms" not in rewards and _holds(rewards, _WEIGHTS | _CONSTANTS)
+    for old, new in (MOVED if flat else _HEIGHTS).items():
         _move(data, old.split("."), new.split("."))
+    if rewards is not None and flat:
+        rewards["terms"] = _filled(rewards["terms"])
     return data
 
 
@@ -45,6 +98,23 @@ def check_resumable(data: dict[str, Any]) -> None:
                 " for the critic, which now share env.height_map; such a policy can be played and"
                 " exported alone"
             )
+
+
+def _filled(given: dict[str, Any]) -> dict[str, Any]:
+    """Return whole terms for what is given of earlier ones, without those that do nothing."""
+    terms = {}
+    for name, term in earlier_terms().items():
+        plain = asdict(term)
+        known = given.get(name, {})
+        plain["params"] |= known.get("params", {})
+        plain["weight"] = known.get("weight", plain["weight"])
+        if plain["weight"] != 0.0:
+            terms[name] = plain
+    return terms
+
+
+def _holds(rewards: dict[str, Any], paths: dict[str, str]) -> bool:
+    return any(path.removeprefix("env.rewards.") in rewards for path in paths)
 
 
 def _move(data: dict[str, Any], old: list[str], new: list[str]) -> None:

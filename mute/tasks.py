@@ -8,7 +8,7 @@ from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg
 from mute.envs.commands import CommandsCfg
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
-from mute.envs.rewards import RewardsCfg
+from mute.envs.rewards import RewardsCfg, paper_terms, reward_term
 from mute.support.errors import MuteError
 
 __all__ = ["DEFAULT_TASK", "make_task", "task_names"]
@@ -31,21 +31,25 @@ def _go1_mute_paper() -> TaskCfg:
 
 def _go1_mute() -> TaskCfg:
     """Return what works on a CPU: led to a trot, then quiet, the feet held up for every beta."""
-    rewards = RewardsCfg(
-        foot_drop_velocity=-0.057,
-        foot_raise_velocity=0.0114,
-        near_ground_drop=-1.71,
-        landing_speed=-3.42,
+    terms = {
+        **paper_terms(),
+        "foot_drop_velocity": reward_term("foot_drop_velocity", -0.057),
+        "foot_raise_velocity": reward_term("foot_raise_velocity", 0.0114),
+        "near_ground_drop": reward_term("near_ground_drop", -1.71),
+        "landing_speed": reward_term("landing_speed", -3.42),
+        "foot_clearance": reward_term("foot_clearance", -20.0),
+        "touchdown_apex": reward_term("touchdown_apex", -2.0),
+        "foot_slip": reward_term("foot_slip", -0.3),
+        "stand_still": reward_term("stand_still", -0.1),
         # A high beta that turns on the spot would rather pivot on its feet than lift them, and
-        # lean until it topples.
-        tilt=-4.0,
-        foot_slip=-0.3,
-        foot_clearance=-20.0,
-        touchdown_apex=-2.0,
-        stand_still=-0.1,
-        fall=-250.0,
+        # lean until it topples; but a first step is not taken level.
+        "tilt": reward_term("orientation", -4.0, group="lift"),
+        "fall": reward_term("fall", -250.0),
         # Robots that shuffle take long to find out that they could step.
-        diagonal_support=0.7,
+        "diagonal_support": reward_term("diagonal_support", 0.7),
+    }
+    rewards = RewardsCfg(
+        terms=terms,
         guide_ramp=(40.0, 60.0),
         lift_ramp=(48.0, 100.0),
         quiet_ramp=(70.0, 138.0),

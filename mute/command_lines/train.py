@@ -25,6 +25,11 @@ from mute.command_lines.arguments import (
     resolve_device,
     selected_task,
 )
+from mute.command_lines.reward_options import (
+    TERM_OPTIONS,
+    with_terms_offered,
+    without_unused_terms,
+)
 from mute.config import AgentCfg, TaskCfg, from_plain, to_plain
 from mute.envs.menagerie import SceneError
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
@@ -239,8 +244,10 @@ def _check_resume(args: TrainArgs, path: Path, seed: int, iteration: int) -> Non
 
 
 def _parse(argv: Sequence[str], task: str, cfg: TaskCfg) -> TrainArgs:
-    default = TrainArgs(task=task, env=cfg.env, agent=cfg.agent)
-    return parse(TrainArgs, current_spelling(argv), "Learn a task.", default)
+    default = TrainArgs(task=task, env=with_terms_offered(cfg.env), agent=cfg.agent)
+    with TERM_OPTIONS:
+        args = parse(TrainArgs, current_spelling(argv), "Learn a task.", default)
+    return dataclasses.replace(args, env=without_unused_terms(args.env, cfg.env))
 
 
 def _configuration(args: TrainArgs) -> TaskCfg:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import pytest
 import torch
@@ -13,7 +12,7 @@ from mute.envs.observations import OBSERVATION_WIDTHS, ObservationsCfg, slices
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
-from mute.envs.rewards import TERMS, RewardsCfg
+from mute.envs.rewards import RewardsCfg, reward_term
 from mute.envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS
 from mute.envs.sensors import sensor_slice
 from mute.envs.terrain import HeightMapCfg
@@ -177,7 +176,7 @@ def test_every_step_has_a_log_of_its_own():
     env = _make_env(2)
     first, second = _stand_still(env)[3]["log"], _stand_still(env)[3]["log"]
     assert first is not second
-    weighted = {name for name in TERMS if getattr(env.cfg.rewards, name) != 0.0}
+    weighted = set(env.cfg.rewards.terms)
     assert {key for key in first if key.startswith("Reward/")} == {f"Reward/{n}" for n in weighted}
     assert all(value.ndim == 0 and value.isfinite() for value in first.values())
 
@@ -462,7 +461,8 @@ def test_without_a_ramp_quiet_is_full_from_the_start():
 
 
 def test_the_guide_leaves_the_reward_with_the_simulated_time():
-    rewards = RewardsCfg(guide_ramp=(0.04, 0.12), diagonal_support=1.0)
+    terms = {"diagonal_support": reward_term("diagonal_support", 1.0)}
+    rewards = RewardsCfg(terms=terms, guide_ramp=(0.04, 0.12))
     env = _make_env(1, rewards=rewards, **CALM)
     env.set_command(torch.tensor([0.5, 0.0, 0.0, 0.0]))
     hips_out = torch.zeros(1, 12)
@@ -497,8 +497,8 @@ def test_the_phase_that_was_handed_over_shapes_the_reward_where_it_is_asked_for(
 
 
 def test_the_true_phase_that_a_step_is_rewarded_by_is_that_of_the_observation_acted_on():
-    only_drop: Any = dict.fromkeys(TERMS, 0.0) | {"foot_drop_velocity": -0.5}
-    rewards = RewardsCfg(**only_drop, phase_source="true")
+    only_drop = {"foot_drop_velocity": reward_term("foot_drop_velocity", -0.5)}
+    rewards = RewardsCfg(terms=only_drop, phase_source="true")
     env = _make_env(2, rewards=rewards, episode_length=0.24, **QUIET)
     moved = 0
     for step in range(20):  # across the end of an episode

@@ -11,7 +11,7 @@ from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg
 from mute.envs.commands import CommandsCfg
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
-from mute.envs.rewards import RewardsCfg
+from mute.envs.rewards import RewardsCfg, paper_terms, reward_term
 from mute.learning.runner import MuteRunner
 from mute.networks.estimator import EstimatorCfg
 
@@ -31,9 +31,12 @@ def make_cfg(iterations: int = 2, **env: Any) -> TaskCfg:
             quiet_ramp=ramp,
             lift_ramp=ramp,
             guide_ramp=ramp,
-            foot_slip=-0.04,
-            stand_still=-0.1,
-            diagonal_support=0.5,
+            terms={
+                **paper_terms(),
+                "foot_slip": reward_term("foot_slip", -0.04),
+                "stand_still": reward_term("stand_still", -0.1),
+                "diagonal_support": reward_term("diagonal_support", 0.5),
+            },
         ),
         "commands": CommandsCfg(initial_share=0.2, ramp=ramp, resampling_time=0.04),
         "randomization": RandomizationCfg(push_interval=0.06),

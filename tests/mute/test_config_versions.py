@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import copy
+import math
+import re
 
 import pytest
+from earlier_versions import estimators_own_heights, flat_rewards
+from places import REPOSITORY
 
-from mute.config import from_plain, to_plain
-from mute.config_versions import check_resumable, upgraded
+from mute.checkpoint import load_checkpoint
+from mute.config import TaskCfg, from_plain, to_plain
+from mute.config_versions import MOVED, check_resumable, earlier_terms, upgraded
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.rewards import RewardsCfg, paper_terms, reward_term
 from mute.tasks import make_task, task_names
 
 
+def _with_flat_rewards(**changed: float) -> dict:
+    return flat_rewards(to_plain(make_task("go1_mute")), **changed)
+
+
 def _with_old_heights(offset: float, scale: float) -> dict:
-    """Return the default task as it was written while the estimator had a scale of its own."""
-    plain = to_plain(make_task("go1_mute"))
-    for name in ("offset", "scale"):
-        del plain["env"]["height_map"][name]
-    plain["agent"]["estimation"]["network"] |= {"height_offset": offset, "height_scale": scale}
-    return plain
+    return estimators_own_heights(to_plain(make_task("go1_mute")), offset, scale)
 
 
 @pytest.mark.parametrize("task", task_names())
@@ -30,6 +36,60 @@ def test_the_estimators_scale_of_heights_becomes_that_of_the_height_map():
     cfg = from_plain(_with_old_heights(0.25, 0.5))
     assert (cfg.env.height_map.offset, cfg.env.height_map.scale) == (0.25, 0.5)
     assert cfg.agent == make_task("go1_mute").agent
+
+
+def test_weights_that_were_fields_become_the_terms_that_they_weighed():
+    assert from_plain(_with_flat_rewards()) == make_task("go1_mute")
+
+
+def test_a_constant_of_all_rewards_becomes_a_parameter_of_its_term():
+    changed = {"desired_height": 0.28, "clearance_target": 0.05, "apex_target": 0.03}
+    terms = from_plain(_with_flat_rewards(**changed)).env.rewards.terms
+    assert terms["base_height"] == reward_term("base_height", -1.0, desired=0.28)
+    assert terms["foot_clearance"] == reward_term("foot_clearance", -20.0, target=0.05)
+    assert terms["touchdown_apex"] == reward_term("touchdown_apex", -2.0, target=0.03)
+
+
+def test_a_term_without_weight_is_gone_and_one_that_is_not_given_has_the_papers():
+    rewards = {"lin_vel_z": 0.0, "smoothness": -0.01, "tilt": -2.0, "k": 0.3}
+    cfg = from_plain({"env": {"rewards": rewards}}).env.rewards
+    expected = paper_terms() | {
+        "smoothness": reward_term("smoothness", -0.01),
+        "tilt": reward_term("orientation", -2.0, group="lift"),
+    }
+    del expected["lin_vel_z"]
+    assert (cfg.terms, cfg.k) == (expected, 0.3)
+
+
+def test_terms_and_weights_in_one_reward_are_refused():
+    plain = to_plain(make_task("go1_mute"))
+    plain["env"]["rewards"]["landing_speed"] = -1.0
+    with pytest.raises(ValueError, match="landing_speed"):
+        from_plain(plain)
+
+
+def test_the_policy_that_ships_was_trained_with_the_rewards_of_its_task():
+    saved = load_checkpoint(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
+    assert from_plain(saved["config"]).env.rewards == make_task("go1_mute").env.rewards
+
+
+@pytest.mark.parametrize("name", ["landing_speed", "apex_target"])
+def test_a_bad_figure_of_an_earlier_version_is_refused_where_it_is_now(name):
+    path = MOVED[f"env.rewards.{name}"].removeprefix("env.")
+    with pytest.raises(ValueError, match=re.escape(path)):
+        from_plain(_with_flat_rewards(**{name: math.inf}))
+
+
+def test_every_field_that_was_moved_has_a_place_now():
+    def at(data: object, path: str) -> object:
+        for part in path.split("."):
+            assert isinstance(data, dict)
+            data = data[part]
+        return data
+
+    plain = to_plain(TaskCfg(QuadrupedEnvCfg(rewards=RewardsCfg(terms=earlier_terms()))))
+    for path in MOVED.values():
+        assert isinstance(at(plain, path), float)
 
 
 def test_a_scale_in_both_places_is_refused():
@@ -53,6 +113,9 @@ def test_a_training_whose_critic_saw_another_scale_cannot_go_on():
         check_resumable(_with_old_heights(0.30, 0.5))
 
 
-@pytest.mark.parametrize("data", [{}, {"agent": 3}, {"agent": {"estimation": None}}])
+@pytest.mark.parametrize(
+    "data",
+    [{}, {"agent": 3}, {"agent": {"estimation": None}}, {"env": {"rewards": [1]}}, {"env": 2}],
+)
 def test_data_without_the_place_of_a_field_is_left_as_it_is(data):
     assert upgraded(data) == data

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import torch
 import yaml
+from earlier_versions import estimators_own_heights, flat_rewards
 from places import REPOSITORY
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from training_process import TINY, start_training, stop_after
@@ -19,9 +20,9 @@ from training_process import TINY, start_training, stop_after
 from mute.checkpoint import load_checkpoint, save_checkpoint
 from mute.command_lines import train
 from mute.command_lines.train import main
-from mute.config import from_plain
+from mute.config import from_plain, to_plain
 from mute.envs.menagerie import SceneError
-from mute.envs.rewards import TERMS
+from mute.envs.rewards import reward_term
 from mute.learning.runner import policy_part
 from mute.support.errors import run_cli
 from mute.tasks import make_task
@@ -107,10 +108,9 @@ def test_options_arrive_in_the_written_parameters_from_which_the_run_is_re_made(
 def test_tensorboard_has_every_reward_term_loss_estimator_error_and_landing_speed(finished):
     run, _ = finished
     rewards = make_task("go1_mute").env.rewards
-    terms = [name for name in TERMS if getattr(rewards, name) != 0.0]
     errors = ("total", "estimation", "forward", "phase", "velocity_rmse", "height_rmse")
     expected = {
-        *(f"Reward/{name}" for name in terms),
+        *(f"Reward/{name}" for name in rewards.terms),
         *(f"Loss/{name}" for name in ("value", "surrogate", "entropy", "learning_rate")),
         *(f"Loss/estimator_{name}" for name in (*errors, "phase_mae", "phase_closed")),
         "Gait/velocity_error_sq",
@@ -242,10 +242,62 @@ def test_an_option_that_a_resumed_run_cannot_heed_is_refused(arguments, words, f
 
 
 def test_options_of_earlier_versions_are_still_understood():
-    args, _ = train._arguments(
-        ["--agent.estimation.network.height-scale", "0.2", "--env.height-map.offset=0.28"]
-    )
+    options = ["--agent.estimation.network.height-scale", "0.2", "--env.height-map.offset=0.28"]
+    options += ["--env.rewards.landing-speed", "-3.5", "--env.rewards.tilt=-5.0"]
+    options += ["--env.rewards.apex_target=0.05", "--env.rewards.desired-height", "0.28"]
+    args, _ = train._arguments(options)
     assert (args.env.height_map.scale, args.env.height_map.offset) == (0.2, 0.28)
+    terms = args.env.rewards.terms
+    assert (terms["landing_speed"].weight, terms["tilt"].weight) == (-3.5, -5.0)
+    assert terms["touchdown_apex"].params == {"target": 0.05}
+    assert terms["base_height"].params == {"desired": 0.28}
+
+
+def test_a_term_has_options_for_its_weight_and_its_parameters():
+    prefix = "--env.rewards.terms.near-ground-drop"
+    args, _ = train._arguments([f"{prefix}.weight", "-2.0", f"{prefix}.params.depth", "0.05"])
+    expected = make_task("go1_mute")
+    expected.env.rewards.terms["near_ground_drop"] = reward_term(
+        "near_ground_drop", -2.0, depth=0.05
+    )
+    assert args.env == expected.env
+
+
+def test_a_term_that_the_task_does_without_can_be_asked_for():
+    options = ["--env.rewards.terms.smoothness.weight", "-0.01", "--env.rewards.tilt", "-1.0"]
+    args, _ = train._arguments(["--task", "go1_mute_paper", *options])
+    expected = make_task("go1_mute_paper")
+    expected.env.rewards.terms |= {
+        "smoothness": reward_term("smoothness", -0.01),
+        "tilt": reward_term("orientation", -1.0, group="lift"),
+    }
+    assert args.env == expected.env
+
+
+def test_help_tells_what_each_term_and_each_parameter_is(capsys):
+    with pytest.raises(SystemExit) as stop:
+        train._arguments(["--help"])
+    assert not stop.value.code
+    text = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    for words in (
+        "--env.rewards.terms.landing-speed.weight FLOAT Penalise each landing by its speed squared",
+        "--env.rewards.terms.near-ground-drop.params.depth FLOAT The height at which 1/e of it",
+        "Group: guide. (default: 0.7)",
+    ):
+        assert words in text
+
+
+def test_a_run_of_an_earlier_version_goes_on_with_its_rewards(finished, tmp_path):
+    saved = load_checkpoint(finished[0] / "model_2.pt")
+    expected = from_plain(saved["config"])
+    saved["config"] = flat_rewards(estimators_own_heights(saved["config"], 0.3, 0.1))
+    old = tmp_path / "go1_mute" / "old" / "model_2.pt"
+    save_checkpoint(old, saved)
+    assert train._configuration(train._arguments(["--resume", str(old)])[0]) == expected
+    assert main(["--plain", "--resume", str(old), "--iterations", "4"]) == 0
+    again = load_checkpoint(old.with_name("model_3.pt"))["config"]["env"]
+    assert again["rewards"] == to_plain(expected)["env"]["rewards"]
+    assert again["height_map"] == to_plain(expected)["env"]["height_map"]
 
 
 def test_the_seed_that_a_resumed_run_has_may_be_given(finished):
@@ -297,7 +349,12 @@ def test_a_checkpoint_that_later_ones_follow_is_not_resumed(finished, capsys):
         (["--agent.activation", "foo"], ["activation", "foo"]),
         (["--agent.init-std", "-1.0"], ["init_std", "-1.0"]),
         (["--env.height-map.spacing", "0.0"], ["height_map.spacing", "> 0", "0.0"]),
-        (["--env.rewards.landing-speed", "nan"], ["rewards.landing_speed", "finite", "nan"]),
+        (["--env.rewards.landing-speed", "nan"], ["rewards.terms.landing_speed.weight", "nan"]),
+        (
+            ["--env.rewards.terms.foot-clearance.params.target", "0"],
+            ["rewards.terms.foot_clearance.params.target", "> 0", "0.0"],
+        ),
+        (["--env.rewards.terms.landing.weight", "1"], ["--env.rewards.terms.landing.weight"]),
         (["--env.observations.noise-level", "inf"], ["observations.noise_level", "inf"]),
         (["--env.randomization.added-mass", "-6.0", "0.0"], ["added_mass", "-5.204", "-6.0"]),
         (["--env.randomization.push-velocity", "nan"], ["push_velocity", "nan"]),

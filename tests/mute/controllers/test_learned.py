@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from earlier_versions import estimators_own_heights
 from learning_helpers import NUM_ENVS, make_cfg, make_runner
 
 from mute.checkpoint import CheckpointError, load_checkpoint, save_checkpoint
@@ -84,14 +85,7 @@ def test_heights_are_estimated_in_the_scale_that_an_earlier_version_gave_the_est
 ):
     runner, path = trained
     small = policy_part(load_checkpoint(path))
-    del (
-        small["config"]["env"]["height_map"]["offset"],
-        small["config"]["env"]["height_map"]["scale"],
-    )
-    small["config"]["agent"]["estimation"]["network"] |= {
-        "height_offset": 0.25,
-        "height_scale": 0.5,
-    }
+    small["config"] = estimators_own_heights(small["config"], 0.25, 0.5)
     save_checkpoint(tmp_path / "old.pt", small)
     observations, heights = runner.env.get_observations(), []
     for file in (path, tmp_path / "old.pt"):

@@ -1,0 +1,293 @@
+"""Reward functions: the paper's Table I, the few that lead to a walk, and how more are added.
+
+Each is a pure function of `Motion` and of numbers that a task may set, without weight. Which of
+them a task uses, how much each weighs and what scales it is `rewards`' business.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+from typing import Literal, get_args
+
+import torch
+
+from .motion import Motion
+
+__all__ = ["REWARD_FUNCTIONS", "Group", "Parameter", "RewardFunction", "register_term"]
+
+Group = Literal["task", "phase", "other", "lift", "guide"]
+"""What scales a term: (1 - k beta), beta times a ramp, 1, a ramp, or a ramp that falls."""
+
+Function = Callable[..., torch.Tensor]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that a reward function takes beside the motion."""
+
+    default: float
+    """Its value unless a task says otherwise."""
+    text: str
+    """What it is, with its unit."""
+    above: float = -math.inf
+    """It must be larger than this."""
+    at_least: float = -math.inf
+    """It must not be smaller than this."""
+    at_most: float = math.inf
+    """It must not be larger than this."""
+
+    def check(self, name: str, value: float) -> None:
+        """Refuse a value that is not finite or out of its range.
+
+        Raises:
+            ValueError: With the name, the value and what is allowed.
+        """
+        if not math.isfinite(value):
+            raise ValueError(f"{name} must be finite, got {value}")
+        if not (self.above < value and self.at_least <= value <= self.at_most):
+            bounds = ((">", self.above), (">=", self.at_least), ("<=", self.at_most))
+            allowed = " and ".join(f"{sign} {x:g}" for sign, x in bounds if math.isfinite(x))
+            raise ValueError(f"{name} must be {allowed}, got {value}")
+
+
+@dataclass(frozen=True)
+class RewardFunction:
+    """A reward function and what is known of it."""
+
+    function: Function
+    """Takes the motion and its parameters by name; returns one number a robot, (num_envs,)."""
+    group: Group
+    """What scales it, unless a task says otherwise."""
+    parameters: Mapping[str, Parameter]
+    """Its parameters by name."""
+
+    @property
+    def text(self) -> str:
+        """Its documentation, in one paragraph."""
+        return " ".join((inspect.getdoc(self.function) or "").split())
+
+    def with_parameters(self, values: Mapping[str, float]) -> Callable[[Motion], torch.Tensor]:
+        """Return it as a function of the motion alone."""
+        return partial(self.function, **values)
+
+
+_functions: dict[str, RewardFunction] = {}
+
+REWARD_FUNCTIONS: Mapping[str, RewardFunction] = MappingProxyType(_functions)
+"""Every reward function by its name."""
+
+
+def register_term(
+    group: Group = "other", **parameters: Parameter
+) -> Callable[[Function], Function]:
+    """Return a decorator that makes a function known to tasks by its name.
+
+    Args:
+        group: What scales it, unless a task says otherwise.
+        parameters: What it takes by name beside the motion.
+
+    Raises:
+        ValueError: Of the decorator, if the name is taken or none of Python's, the group unknown,
+            a default out of its range, or the function takes something else.
+    """
+
+    def register(function: Function) -> Function:
+        name = function.__name__
+        if name in _functions or not name.isidentifier():
+            reason = "is registered already" if name in _functions else "has no name of its own"
+            raise ValueError(f"the reward function {name!r} {reason}; give it another name")
+        if group not in get_args(Group):
+            allowed = ", ".join(get_args(Group))
+            raise ValueError(f"{name}: group must be one of {allowed}, got {group!r}")
+        taken = list(inspect.signature(function).parameters)[1:]
+        if taken != list(parameters):
+            raise ValueError(
+                f"{name} takes {taken} beside the motion, and is registered with {list(parameters)}"
+            )
+        for parameter_name, parameter in parameters.items():
+            parameter.check(f"{name}.{parameter_name}", parameter.default)
+        _functions[name] = RewardFunction(function, group, MappingProxyType(parameters))
+        return function
+
+    return register
+
+
+_SHARPNESS = "inverse of the squared error at which 1/e of it is left"
+
+
+@register_term("task", sharpness=Parameter(4.0, f"{_SHARPNESS}, s^2/m^2", above=0.0))
+def lin_vel_tracking(motion: Motion, sharpness: float) -> torch.Tensor:
+    """Reward the commanded horizontal velocity: exp(-sharpness |v_xy^cmd - v_xy|^2)."""
+    error = (motion.command[:, :2] - motion.base_lin_vel[:, :2]).square().sum(dim=1)
+    return torch.exp(-sharpness * error)
+
+
+@register_term("task", sharpness=Parameter(4.0, f"{_SHARPNESS}, s^2/rad^2", above=0.0))
+def ang_vel_tracking(motion: Motion, sharpness: float) -> torch.Tensor:
+    """Reward the commanded yaw rate: exp(-sharpness (w_z^cmd - w_z)^2)."""
+    return torch.exp(-sharpness * (motion.command[:, 2] - motion.base_ang_vel[:, 2]).square())
+
+
+@register_term("phase")
+def foot_drop_velocity(motion: Motion) -> torch.Tensor:
+    """Penalise feet that move down, most just before contact (paper, eq. 8).
+
+    Sum over feet of exp(phase) v_drop^2.
+    """
+    return (motion.phase.exp() * motion.foot_drop_sq).sum(dim=1)
+
+
+@register_term("phase")
+def foot_raise_velocity(motion: Motion) -> torch.Tensor:
+    """Reward feet that move up, most just after foot-off (paper, eq. 8).
+
+    Sum over feet of exp(-phase) v_raise^2.
+    """
+    return ((-motion.phase).exp() * motion.foot_raise_sq).sum(dim=1)
+
+
+@register_term("phase", depth=Parameter(0.02, "height at which 1/e of it is left, m", above=0.0))
+def near_ground_drop(motion: Motion, depth: float) -> torch.Tensor:
+    """Penalise feet that move down close to the ground, whatever the phase; not in the paper.
+
+    Sum over feet of exp(-height / depth) v_drop^2.
+    """
+    return (torch.exp(-motion.foot_height.clamp(min=0.0) / depth) * motion.foot_drop_sq).sum(dim=1)
+
+
+@register_term("phase")
+def landing_speed(motion: Motion) -> torch.Tensor:
+    """Penalise each landing by its speed squared, to which the impact's energy is proportional.
+
+    Sum over the feet that land; not in the paper.
+    """
+    return motion.landing_speed.square().sum(dim=1)
+
+
+@register_term()
+def lin_vel_z(motion: Motion) -> torch.Tensor:
+    """Penalise a bouncing trunk: v_z^2."""
+    return motion.base_lin_vel[:, 2].square()
+
+
+@register_term()
+def ang_vel_xy(motion: Motion) -> torch.Tensor:
+    """Penalise a rolling and pitching trunk: |w_xy|^2."""
+    return motion.base_ang_vel[:, :2].square().sum(dim=1)
+
+
+@register_term()
+def joint_power(motion: Motion) -> torch.Tensor:
+    """Penalise mechanical power: sum over joints of |torque| |velocity|."""
+    return (motion.torque * motion.joint_vel).abs().sum(dim=1)
+
+
+@register_term()
+def joint_acc(motion: Motion) -> torch.Tensor:
+    """Penalise joint accelerations: their sum of squares."""
+    return motion.joint_acc.square().sum(dim=1)
+
+
+@register_term()
+def action_rate(motion: Motion) -> torch.Tensor:
+    """Penalise changes of the action: |a_t - a_{t-1}|^2."""
+    return (motion.action - motion.last_action).square().sum(dim=1)
+
+
+@register_term()
+def collision(motion: Motion) -> torch.Tensor:
+    """Count the links other than feet that touch the ground."""
+    return motion.collisions
+
+
+@register_term(desired=Parameter(0.30, "height of the trunk above the ground, m", above=0.0))
+def base_height(motion: Motion, desired: float) -> torch.Tensor:
+    """Penalise a trunk off its desired height: (desired - height)^2."""
+    return (desired - motion.base_height).square()
+
+
+@register_term()
+def orientation(motion: Motion) -> torch.Tensor:
+    """Penalise a tilted trunk: |g_xy|^2."""
+    return motion.projected_gravity[:, :2].square().sum(dim=1)
+
+
+@register_term()
+def smoothness(motion: Motion) -> torch.Tensor:
+    """Penalise the second difference of the actions: |a_t - 2 a_{t-1} + a_{t-2}|^2; DreamWaQ's."""
+    second = motion.action - 2.0 * motion.last_action + motion.action_before_last
+    return second.square().sum(dim=1)
+
+
+@register_term()
+def power_distribution(motion: Motion) -> torch.Tensor:
+    """Penalise power that is spread unevenly over the joints: its variance; DreamWaQ's."""
+    power = motion.torque * motion.joint_vel
+    # Not `var`, which takes ten times as long over rows this short on a CPU.
+    return (power - power.mean(dim=1, keepdim=True)).square().mean(dim=1)
+
+
+@register_term("lift", target=Parameter(0.06, "clearance of a foot in swing, m", above=0.0))
+def foot_clearance(motion: Motion, target: float) -> torch.Tensor:
+    """Penalise feet that travel off their target clearance; DreamWaQ's.
+
+    Sum over feet of (target - clearance)^2 |v_xy|.
+    """
+    error = (target - motion.foot_height).square()
+    return (error * motion.foot_speed_xy).sum(dim=1)
+
+
+@register_term("lift", target=Parameter(0.04, "apex that a swing should reach, m", above=0.0))
+def touchdown_apex(motion: Motion, target: float) -> torch.Tensor:
+    """Penalise, at landing, a swing that stayed below its target.
+
+    Sum over the feet that land of max(1 - apex / target, 0), while asked to move.
+    """
+    missing = (1.0 - motion.swing_apex / target).clamp(min=0.0)
+    return (missing * motion.touchdown).sum(dim=1) * _asked_to_move(motion)
+
+
+@register_term("lift")
+def foot_slip(motion: Motion) -> torch.Tensor:
+    """Penalise feet that slide: sum over the feet in contact of |v_xy|^2."""
+    return (motion.foot_speed_xy.square() * motion.contact).sum(dim=1)
+
+
+@register_term("lift")
+def stand_still(motion: Motion) -> torch.Tensor:
+    """Penalise leaving the stance while asked to stand: sum over joints of the distance to it."""
+    standing = ~_asked_to_move(motion)
+    return motion.joint_pos.abs().sum(dim=1) * standing
+
+
+@register_term("lift")
+def fall(motion: Motion) -> torch.Tensor:
+    """Penalise a fall: 1 in the step that ends an episode by one; not in the paper.
+
+    Where the other terms leave little to gain, as a high beta does at a fast command, ending the
+    episode would cost nothing else.
+    """
+    return motion.fallen.float()
+
+
+@register_term("guide")
+def diagonal_support(motion: Motion) -> torch.Tensor:
+    """Reward the difference between the diagonals: 1 for standing on one alone, as a trot does.
+
+    Half |c_FR + c_RL - c_FL - c_RR| of the contacts c, unless asked to stand; not in the paper. Two
+    feet balance a robot for as long as it takes to tip over, so it has to step to earn that. One
+    foot off the ground, or one on it, earns half.
+    """
+    front_right, front_left, rear_right, rear_left = motion.contact.float().unbind(dim=1)
+    difference = front_right + rear_left - front_left - rear_right
+    return 0.5 * difference.abs() * _asked_to_move(motion)
+
+
+def _asked_to_move(motion: Motion) -> torch.Tensor:
+    """Return which robots have a command other than to stand. Shape: (num_envs,)."""
+    return (motion.command[:, :3] != 0.0).any(dim=1)
