@@ -12,7 +12,7 @@ import torch
 from .quadruped_env import NUM_ACTIONS, QuadrupedEnv
 from .quadruped_env_cfg import QuadrupedEnvCfg
 
-__all__ = ["Robots"]
+__all__ = ["Robots", "info_of"]
 
 _OPTIONS = ("command", "beta")
 
@@ -24,6 +24,7 @@ class Robots:
         """Remember the task; the robots are made by the first `reset`."""
         self.cfg = cfg
         self._env: QuadrupedEnv | None = None
+        self._unstable = np.zeros(cfg.num_envs, dtype=np.bool_)
         self._held = torch.zeros(cfg.num_envs, dtype=torch.bool)
         self._held_command = torch.zeros(cfg.num_envs, 4)
 
@@ -60,6 +61,7 @@ class Robots:
         else:
             self._env = QuadrupedEnv(replace(self.cfg, seed=seed))
             self._env.autoreset = False
+        self._unstable = np.zeros(self.cfg.num_envs, dtype=np.bool_)
         self._held.fill_(command is not None)
         if command is None and beta is None:
             return
@@ -75,21 +77,36 @@ class Robots:
         """Begin the next episode of some robots; a held command ends with its episode."""
         mask = torch.from_numpy(finished)
         self._held &= ~mask
+        self._unstable = self._unstable & ~finished
         self.env.reset(mask)
 
-    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def step(
+        self, actions: np.ndarray, anew: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Advance by one control step; return rewards, terminated and truncated, (num_envs,) each.
 
+        Args:
+            actions: Joint offsets over `action_scale`. Shape: (num_envs, 12).
+            anew: Robots that begin their next episode instead, whatever their action: they gain
+                nothing, and nothing of theirs ends. None for none. Shape: (num_envs,), bool.
+
         Raises:
-            ValueError: If the actions have another shape than (num_envs, 12).
+            ValueError: If the actions have another shape, or one that counts is not finite.
         """
         shape = (self.cfg.num_envs, NUM_ACTIONS)
         if actions.shape != shape:
             raise ValueError(f"actions must have shape {shape}, got {actions.shape}")
+        idle = np.zeros(shape[0], dtype=np.bool_) if anew is None else anew
+        actions = np.where(idle[:, np.newaxis], 0.0, actions)
+        _check_finite(actions)
         _, rewards, dones, extras = self.env.step(torch.as_tensor(actions, dtype=torch.float32))
+        self._unstable = self.env.unstable.numpy()
         self._hold_command()
-        time_outs = extras["time_outs"]
-        return rewards.numpy(), (dones & ~time_outs).numpy(), time_outs.numpy()
+        truncated = extras["time_outs"].numpy()
+        terminated = dones.numpy() & ~truncated
+        if idle.any():
+            self.reset_finished(idle)
+        return np.where(idle, np.float32(0.0), rewards), terminated & ~idle, truncated & ~idle
 
     def observations(self) -> np.ndarray:
         """Return what the robots see. Shape: (num_envs, OBS_DIM)."""
@@ -101,6 +118,7 @@ class Robots:
         return {
             "privileged": self.env.get_observations()["privileged"].numpy(),
             "landing_speed": self.env.footfalls.landing_speed.numpy(),
+            "unstable": self._unstable,
         }
 
     def _hold_command(self) -> None:
@@ -111,6 +129,23 @@ class Robots:
         wanted = torch.where(self._held.unsqueeze(1), self._held_command, drawn)
         if not torch.equal(wanted, drawn):
             self.env.set_command(wanted)
+
+
+def info_of(infos: dict[str, np.ndarray], index: int) -> dict[str, Any]:
+    """Return one robot's part of what `Robots.infos` returned."""
+    info = {name: values[index] for name, values in infos.items()}
+    # Of numpy's bool Gymnasium's vector environments would make an array of objects.
+    return info | {"unstable": bool(info["unstable"])}
+
+
+def _check_finite(actions: np.ndarray) -> None:
+    wrong = np.argwhere(~np.isfinite(actions))
+    if len(wrong):
+        robot, joint = wrong[0]
+        raise ValueError(
+            f"actions must be finite, got {actions[robot, joint]} for joint {joint} of robot"
+            f" {robot}"
+        )
 
 
 def _read_options(

@@ -311,11 +311,10 @@ def _layout(value):
     return value.shape, value.dtype
 
 
-def test_the_infos_are_laid_out_as_those_of_gymnasiums_own_vector_environment():
-    own = _make_vector_env(2, episode_length=0.1)
-    theirs = SyncVectorEnv(
-        [lambda: _make_env(episode_length=0.1)] * 2, autoreset_mode=AutoresetMode.SAME_STEP
-    )
+@pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
+def test_the_infos_are_laid_out_as_those_of_gymnasiums_own_vector_environment(mode):
+    own = Go1VectorEnv(2, _make_cfg(episode_length=0.1), autoreset_mode=mode)
+    theirs = SyncVectorEnv([lambda: _make_env(episode_length=0.1)] * 2, autoreset_mode=mode)
     layouts = []
     for env in (own, theirs):
         layouts.append([_layout(env.reset(seed=0)[1])])
@@ -356,16 +355,47 @@ def test_a_batch_renders_every_robot(monkeypatch):
     env.close()
 
 
-# -- registration ------------------------------------------------------------------------------
+# -- what went wrong ---------------------------------------------------------------------------
 
 
-def test_make_gives_the_environment_without_another_time_limit():
-    env = gymnasium.make("mute.envs.gym:MUTE/Go1-v0")
-    assert isinstance(env.unwrapped, Go1Env)
-    assert "TimeLimit" not in str(env)
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_an_action_that_is_no_number_is_refused_with_its_place(value):
+    env = _make_vector_env(2)
+    env.reset(seed=0)
+    actions = _constant(env)
+    actions[1, 3] = value
+    with pytest.raises(ValueError, match=f"must be finite, got {value} for joint 3 of robot 1"):
+        env.step(actions)
+    single = _make_env()
+    single.reset(seed=0)
+    with pytest.raises(ValueError, match=f"must be finite, got {value} for joint 3 of robot 0"):
+        single.step(actions[1])
 
 
-def test_make_vec_gives_the_batch():
-    env = gymnasium.make_vec("MUTE/Go1-v0", num_envs=2, cfg=_make_cfg())
-    assert isinstance(env, Go1VectorEnv)
-    assert env.reset(seed=0)[0].shape == (2, 46)
+def test_a_simulation_that_blows_up_truncates_and_its_robot_is_seen_standing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log of warnings into the working directory
+    env = _make_env()
+    env.reset(seed=0)
+    assert env.step(_constant(env))[4]["unstable"] is False
+    env._robots.env.simulation.qpos[0, 2] = np.nan
+    observation, reward, terminated, truncated, info = env.step(_constant(env))
+    assert (reward, terminated, truncated, info["unstable"]) == (0.0, False, True, True)
+    assert np.isfinite(observation).all()
+    assert np.isfinite(info["privileged"]).all()
+    np.testing.assert_allclose(observation[POLICY["projected_gravity"]], (0.0, 0.0, -1.0))
+    assert env.reset()[1]["unstable"] is False
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
+def test_of_a_batch_the_robot_alone_whose_simulation_blew_up_is_told(mode, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    env = Go1VectorEnv(2, _make_cfg(), autoreset_mode=mode)
+    env.reset(seed=0)
+    env._robots.env.simulation.qpos[1, 2] = np.nan
+    _, _, terminated, truncated, infos = env.step(_constant(env))
+    assert not terminated.any()
+    assert truncated.tolist() == [False, True]
+    same = mode is AutoresetMode.SAME_STEP
+    told = infos["final_info"]["unstable"] if same else infos["unstable"]
+    assert told.tolist() == [False, True]
+    assert not env.step(_constant(env))[4]["unstable"].any()
