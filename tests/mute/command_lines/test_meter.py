@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import signal
 import subprocess
 import sys
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -486,17 +488,19 @@ def test_a_sound_that_has_no_loudness_is_told_in_one_line(tmp_path, calibration,
         meter.main([str(tmp_path / "walk.wav"), *arguments])
 
 
-def test_the_loudness_of_a_recording_through_a_pipe_is_taken(tmp_path, calibration):
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_the_loudness_of_a_recording_through_a_pipe_is_taken(capsys, tmp_path, calibration):
     pytest.importorskip("mosqito", reason="needs mute[loudness]")
-    path = tmp_path / "walk.wav"
+    path, pipe = tmp_path / "walk.wav", tmp_path / "pipe"
     write_sound(path, tone(0.1, seconds=0.6), RATE)
-    arguments = ["--calibration-db", "94", "--calibration-file", str(calibration), "--loudness"]
-    program = [sys.executable, "-m", "mute.acoustics.meter", "/dev/stdin", "--json", *arguments]
-    done = subprocess.run(
-        program, input=path.read_bytes(), capture_output=True, check=True, cwd=REPOSITORY
-    )
+    os.mkfifo(pipe)
+    sender = threading.Thread(target=pipe.write_bytes, args=(path.read_bytes(),))
+    sender.start()
+    arguments = ("--calibration-db", 94, "--calibration-file", calibration, "--loudness")
+    figures, _ = run(capsys, pipe, *arguments)
+    sender.join()
     # 88 dB at 1 kHz: each 10 dB above 40 double the sone.
-    assert json.loads(done.stdout)["loudness_n5"] == pytest.approx(2.0 ** (47.98 / 10.0), rel=0.05)
+    assert figures["loudness_n5"] == pytest.approx(2.0 ** (47.98 / 10.0), rel=0.05)
 
 
 @pytest.mark.parametrize("level", [40, 50, 60, 70])

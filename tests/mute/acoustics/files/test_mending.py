@@ -208,7 +208,7 @@ def test_damage_anywhere_in_a_header_gives_samples_or_one_line(tmp_path):
     whole.append((tmp_path / "made.wav").read_bytes())
     read, refused = 0, 0
     tracemalloc.start()
-    for _ in range(1500):
+    for _ in range(500):
         content = bytearray(whole[random.integers(len(whole))])
         for place in random.integers(0, 100, random.integers(0, 4)):
             content[place % len(content)] = random.integers(256)
@@ -228,5 +228,5 @@ def test_damage_anywhere_in_a_header_gives_samples_or_one_line(tmp_path):
             read += 1
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert min(read, refused) > 100
+    assert min(read, refused) > 50
     assert peak < 1 << 20
