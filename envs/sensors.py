@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import mujoco
+import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from .scene import LEGS
 from .simulation import Simulation
 
-__all__ = ["RobotSensors", "sensor_history", "sensor_slice"]
+__all__ = ["RobotSensors", "past_readings", "sensor_slice"]
 
 _NUM_SHAPES = 14
 """Collision shapes other than feet: trunk, head, and hip, thigh and shank of each leg."""
@@ -33,12 +35,6 @@ class RobotSensors:
         def now(first: str, count: int) -> torch.Tensor:
             return simulation.sensordata[:, sensor_slice(model, first, count)]
 
-        def past(first: str) -> torch.Tensor:
-            columns, samples, size = sensor_history(model, first, feet)
-            rows = simulation.history[:, columns].unflatten(1, (feet, -1))
-            readings = rows[:, :, 2 + samples :].unflatten(2, (samples, size))
-            return readings.permute(2, 0, 1, 3)
-
         self.foot_pos = now(f"{LEGS[0]}_foot_pos", feet).unflatten(1, (feet, 3))
         """Centre of each foot in the world, m. Shape: (num_envs, 4, 3)."""
         self.foot_vel = now(f"{LEGS[0]}_foot_vel", feet).unflatten(1, (feet, 3))
@@ -49,10 +45,12 @@ class RobotSensors:
         """Number of contacts of trunk and head. Shape: (num_envs, 2)."""
         self.shape_contact = now("trunk_contact", _NUM_SHAPES)
         """Number of contacts of every collision shape but the feet. Shape: (num_envs, 14)."""
-        self.foot_vel_z_history = past(f"{LEGS[0]}_foot_vel")[..., 2]
+        self.foot_vel_z_history = past_readings(simulation, f"{LEGS[0]}_foot_vel", feet)[..., 2]
         """Vertical velocity of each foot at the last physics steps, the oldest first, m/s.
         Shape: (foot_samples, num_envs, 4)."""
-        self.foot_contact_history = past(f"{LEGS[0]}_foot_contact")[..., 0]
+        self.foot_contact_history = past_readings(simulation, f"{LEGS[0]}_foot_contact", feet)[
+            ..., 0
+        ]
         """Number of contacts of each foot, likewise. Shape: (foot_samples, num_envs, 4)."""
 
 
@@ -81,22 +79,60 @@ def sensor_slice(model: mujoco.MjModel, first_name: str, count: int) -> slice:
     return slice(start, start + count * int(model.sensor_dim[first]))
 
 
-def sensor_history(model: mujoco.MjModel, first_name: str, count: int) -> tuple[slice, int, int]:
-    """Return where `count` sensors, from `first_name` on, keep their past readings.
+def past_readings(simulation: Simulation, first_name: str, count: int) -> torch.Tensor:
+    """Return what `count` sensors, from `first_name` on, read at the last physics steps.
 
-    Each keeps a row of two numbers of MuJoCo's own, a time for every sample, and the samples.
+    The oldest reading comes first after every whole round of steps, of as many as are kept. It is a
+    view of the engine's own buffer, which follows every step.
 
     Returns:
-        The columns of `history` that all rows fill, the samples and the dimension of a sensor.
+        Shape: (samples, num_envs, count, dimension of a sensor).
 
     Raises:
-        ValueError: There are no such sensors, or they keep nothing.
+        ValueError: There are no such sensors, they keep nothing, or this version of MuJoCo keeps it
+            in another order.
     """
-    dim = sensor_slice(model, first_name, count)  # checks that the sensors are there and of a kind
-    size = (dim.stop - dim.start) // count
+    model = simulation.model
+    columns = sensor_slice(model, first_name, count)  # checks that they are there and of a kind
+    size = (columns.stop - columns.start) // count
     first = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, first_name)
     samples = int(model.sensor_history[first, 0])
     if samples < 1:
         raise ValueError(f"first_name is {first_name!r}: the sensor keeps no past readings")
-    start = int(model.sensor_historyadr[first])
-    return slice(start, start + count * (2 + samples * (1 + size))), samples, size
+    width = samples * size
+    places = np.stack([_history_places(model, first + i, samples, size) for i in range(count)])
+    start, stride = int(places[0, 0]), int(places[1, 0] - places[0, 0]) if count > 1 else width
+    regular = start + stride * np.arange(count)[:, np.newaxis] + np.arange(width)
+    if not np.array_equal(places, regular):
+        raise ValueError(_ANOTHER_ORDER)
+    rows = simulation.history[:, start:].unfold(1, width, stride)[:, :count]
+    return rows.unflatten(2, (samples, size)).permute(2, 0, 1, 3)
+
+
+_ANOTHER_ORDER = (
+    f"MuJoCo {mujoco.__version__} keeps past readings in another order than the versions that are"
+    " known here: install one of those that pyproject.toml names"
+)
+
+
+def _history_places(
+    model: mujoco.MjModel, sensor: int, samples: int, size: int
+) -> NDArray[np.integer]:
+    """Return where a sensor's past readings lie in MuJoCo's `history`, the oldest first.
+
+    MuJoCo documents how to write them there but not where that is, so marks are written and found.
+
+    Returns:
+        Places of all numbers of all readings. Shape: (samples * size,).
+
+    Raises:
+        ValueError: The marks are not found.
+    """
+    data = mujoco.MjData(model)
+    times = np.arange(-samples, 0.0)[:, np.newaxis]
+    marks = np.arange(samples * size) + 0.5  # no time and no count
+    mujoco.mj_initSensorHistory(model, data, sensor, times, marks.reshape(samples, size), 0.0)
+    mark, place = np.nonzero(data.history == marks[:, np.newaxis])
+    if not np.array_equal(mark, np.arange(len(marks))):
+        raise ValueError(_ANOTHER_ORDER)
+    return place

@@ -49,7 +49,7 @@ class Simulation(Protocol):
     actuator_force: torch.Tensor
     """Actuator forces, N or N m. Shape: (num_envs, nu)."""
     history: torch.Tensor
-    """Past readings of the sensors that keep them, see `sensors.sensor_history`: rings, which begin
+    """Past readings of the sensors that keep them, see `sensors.past_readings`: rings, which begin
     with the oldest reading after as many steps as they hold. Shape: (num_envs, nhistory)."""
 
     def step(self, num_steps: int = 1) -> None:

@@ -11,7 +11,7 @@ import torch
 from mute.envs.batch_simulation import BatchSimulation
 from mute.envs.engines import make_simulation
 from mute.envs.scene import SceneCfg, build_scene
-from mute.envs.sensors import sensor_history, sensor_slice
+from mute.envs.sensors import past_readings, sensor_slice
 from mute.envs.simulation import Engine
 
 MODEL = build_scene(SceneCfg())
@@ -275,9 +275,8 @@ def test_a_state_of_another_number_of_robots_is_refused(make_standing):
 def test_one_call_keeps_what_each_of_its_steps_read(samples, engine):
     model = build_scene(SceneCfg(), foot_samples=samples)
     single, several = (make_simulation(model, 2, num_threads=1, engine=engine) for _ in range(2))
-    columns, kept, size = sensor_history(model, "FR_foot_vel", 4)
-    assert (kept, size) == (samples, 3)
-    past = several.history[:, columns].unflatten(1, (4, -1))[:, :, 2 + samples :]
+    past = past_readings(several, "FR_foot_vel", 4)
+    assert past.shape == (samples, 2, 4, 3)
     now = single.sensordata[:, sensor_slice(model, "FR_foot_vel", 4)]
     for call in range(5):
         read = []
@@ -285,8 +284,8 @@ def test_one_call_keeps_what_each_of_its_steps_read(samples, engine):
             single.step()
             read.append(now.clone())
         several.step(samples)
-        expected = torch.stack(read, dim=1).view(2, samples, 4, 3).transpose(1, 2)
-        assert torch.equal(past.unflatten(2, (samples, 3)), expected)
+        expected = torch.stack(read).view(samples, 2, 4, 3)
+        assert torch.equal(past, expected)
         assert bool((expected != 0.0).any()) == (call > 0 or samples > 1)
         for simulation in (single, several):
             if call == 2:  # a ring of a simulation that begins anew begins anew as well

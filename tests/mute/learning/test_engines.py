@@ -19,7 +19,7 @@ from places import SHIPPED_POLICY
 from mute.checkpoint import CheckpointError
 from mute.controllers import LearnedController, load_policy
 from mute.envs.quadruped_env import QuadrupedEnv
-from mute.envs.sensors import sensor_history, sensor_slice
+from mute.envs.sensors import past_readings, sensor_slice
 from mute.envs.warp_simulation import WarpSimulation
 from mute.evaluation.gait import GaitMeter
 from mute.evaluation.trials import evaluation_cfg
@@ -52,8 +52,7 @@ def _put_at_the_same(one, other):
 
 def _contacts(env):
     """Return what all contact sensors found, at every physics step where they keep it."""
-    columns, samples, _ = sensor_history(env.model, "FR_foot_contact", 4)
-    feet = env.simulation.history[:, columns].unflatten(1, (4, -1))[:, :, 2 + samples :]
+    feet = past_readings(env.simulation, "FR_foot_contact", 4).transpose(0, 1)
     links = env.simulation.sensordata[:, sensor_slice(env.model, "trunk_contact", 14)]
     return torch.cat((feet.flatten(1), links), dim=1)
 
