@@ -11,7 +11,7 @@ from typing import Any
 from places import REPOSITORY
 
 TINY = ["--plain", "--num-envs", "4", "--env.num-threads", "1", "--agent.num-steps-per-env", "6"]
-TINY += ["--agent.actor-hidden", "8", "--agent.critic-hidden", "8"]
+TINY += ["--agent.actor-hidden", "8", "--agent.critic-hidden", "8", "--agent.noise-interval", "0"]
 """Options of a training whose iterations take a moment."""
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import io
 import json
 import math
 import os
@@ -72,6 +74,16 @@ def _play(*words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+def _play_here(*words: str) -> subprocess.CompletedProcess[str]:
+    """Run the command in this process, which spares its start."""
+    with (
+        contextlib.redirect_stdout(io.StringIO()) as out,
+        contextlib.redirect_stderr(io.StringIO()) as errors,
+    ):
+        status = main(words)
+    return subprocess.CompletedProcess(words, status, out.getvalue(), errors.getvalue())
+
+
 @pytest.fixture(scope="module")
 def policy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Write a small policy with random weights."""
@@ -90,7 +102,7 @@ def heard(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Path]:
     """Return what a second of the shipped policy on tile prints, and its sound."""
     path = tmp_path_factory.mktemp("sound") / "new" / "tile.wav"
     words = ("--beta", "0", "--surface", "tile", "--wav", str(path), "--seconds", "1", "--json")
-    run = _play(*words)
+    run = _play_here(*words)
     assert run.returncode == 0, run.stderr
     return json.loads(run.stdout), path
 
@@ -111,7 +123,7 @@ def test_json_prints_one_object_on_standard_output_and_nothing_else(policy):
 
 
 def test_without_a_display_each_second_is_a_line_and_a_summary_ends_it(policy):
-    run = _play("--policy", str(policy), "--seconds", "2")
+    run = _play_here("--policy", str(policy), "--seconds", "2")
     assert run.returncode == 0, run.stderr
     seconds = [line for line in run.stdout.splitlines() if line.startswith(("  1.0 s", "  2.0 s"))]
     assert len(seconds) == 2
@@ -124,7 +136,8 @@ def test_without_a_display_each_second_is_a_line_and_a_summary_ends_it(policy):
 
 
 def test_a_level_is_said_to_be_of_the_floor_walked_on_and_of_the_first_of_several_robots(policy):
-    run = _play("--policy", str(policy), "--seconds", "2", "--surface", "tile", "--num-envs", "2")
+    words = ("--seconds", "2", "--surface", "tile", "--num-envs", "2")
+    run = _play_here("--policy", str(policy), *words)
     assert run.returncode == 0, run.stderr
     assert "sounding as" not in run.stdout
     assert re.search(r"MNL +\d\d\.\d dBA \(modelled, on tile, first robot\)", run.stdout)

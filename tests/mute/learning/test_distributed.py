@@ -35,7 +35,7 @@ from mute.learning.runner import MuteRunner
 from mute.support.errors import MuteError
 
 TINY = ["--plain", "--num-envs", "4", "--agent.num-steps-per-env", "6"]
-TINY += ["--agent.actor-hidden", "8", "--agent.critic-hidden", "8"]
+TINY += ["--agent.actor-hidden", "8", "--agent.critic-hidden", "8", "--agent.noise-interval", "0"]
 _PATIENCE = 240.0
 """Seconds that processes get on a busy machine; they take a few."""
 ENVIRONMENT = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(REPOSITORY)}
