@@ -6,6 +6,7 @@ tells which command, seed, commit and machine made it and what it reaches.
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 import tempfile
@@ -23,6 +24,8 @@ from mute.controllers import load_policy
 from mute.controllers.onnx_export import export_policy
 from mute.evaluation.tables import read_json, write_json
 from mute.learning.runner import policy_part
+from mute.support.files import write_file
+from mute.support.provenance import REPOSITORY
 from mute.support.resources import RESOURCES
 
 __all__ = ["ReleaseArgs", "main"]
@@ -50,12 +53,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     if "logger" not in checkpoint:
         raise CheckpointError(f"{args.checkpoint} holds a policy only, not a training")
     name = checkpoint["task"]
-    policy_path = args.out / f"{name}.pt"
-    save_checkpoint(policy_path, policy_part(checkpoint))
-    export_policy(load_policy(policy_path), args.out / f"{name}.onnx")
-    card = _training(args.checkpoint, checkpoint) | {"figures": _figures(policy_path)}
-    write_json(args.out / f"{name}.json", card)
-    print(f"written: {policy_path}, {name}.onnx, {name}.json", file=sys.stderr)
+    training = _training(args.checkpoint, checkpoint)
+    # Whoever interrupts the measurement finds the files of the last release, which belong together.
+    with tempfile.TemporaryDirectory() as folder:
+        policy_path, onnx_path = Path(folder) / f"{name}.pt", Path(folder) / f"{name}.onnx"
+        save_checkpoint(policy_path, policy_part(checkpoint))
+        export_policy(load_policy(policy_path), onnx_path)
+        figures = _figures(policy_path)
+        for path in (policy_path, onnx_path):
+            write_file(args.out / path.name, path.read_bytes())
+    figures["policy"] = os.path.relpath(args.out / f"{name}.pt", REPOSITORY)
+    write_json(args.out / f"{name}.json", training | {"figures": figures})
+    print(f"written: {args.out / f'{name}.pt'}, {name}.onnx, {name}.json", file=sys.stderr)
     return 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mute.evaluation.noise_levels import NoiseRow
+from mute.support.files import write_file
 
 __all__ = ["draw_beta_sweep", "draw_speed_sweep", "save_figure"]
 
@@ -64,11 +66,17 @@ def draw_beta_sweep(rows: Sequence[NoiseRow], directory: Path) -> list[Path]:
 
 
 def save_figure(figure: Figure, stem: Path) -> list[Path]:
-    """Write a figure as PNG and SVG and return the files."""
-    stem.parent.mkdir(parents=True, exist_ok=True)
+    """Write a figure as PNG and SVG, each whole or not at all, and return the files.
+
+    Raises:
+        DiskError: If one cannot be written.
+    """
     paths = [stem.with_suffix(suffix) for suffix in (".png", ".svg")]
     for path in paths:
-        figure.savefig(path, dpi=160, metadata={"Date": None} if path.suffix == ".svg" else None)
+        picture, form = io.BytesIO(), path.suffix.removeprefix(".")
+        metadata = {"Date": None} if form == "svg" else None
+        figure.savefig(picture, format=form, dpi=160, metadata=metadata)
+        write_file(path, picture.getvalue())
     return paths
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from mute.support.files import write_file
 from mute.support.plain_data import without_nan
 
 __all__ = ["print_table", "read_json", "write_csv", "write_json"]
@@ -35,18 +37,25 @@ def print_table(title: str, rows: Sequence[Row], columns: Sequence[str]) -> None
 
 
 def write_csv(path: Path, rows: Sequence[Row]) -> None:
-    """Write a table as CSV with a header."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+    """Write a table as CSV with a header, whole or not at all.
+
+    Raises:
+        DiskError: If it cannot be written.
+    """
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, fieldnames=list(rows[0]))
+    writer.writeheader()
+    writer.writerows(rows)
+    write_file(path, text.getvalue().encode())
 
 
 def write_json(path: Path, content: object) -> None:
-    """Write plain data as JSON; NaN becomes null, which JSON lacks a number for."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(without_nan(content), indent=2) + "\n")
+    """Write plain data as JSON, whole or not at all; NaN becomes null, as JSON lacks a number.
+
+    Raises:
+        DiskError: If it cannot be written.
+    """
+    write_file(path, (json.dumps(without_nan(content), indent=2) + "\n").encode())
 
 
 def read_json(path: Path) -> Any:  # noqa: ANN401

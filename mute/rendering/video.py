@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import Any
 
 import imageio
+import imageio_ffmpeg
 import mujoco
 import numpy as np
 
@@ -28,6 +29,7 @@ _WIDTH, _HEIGHT = 1280, 720
 _SOFTWARE_RATE = 25.0
 """Most pictures a second where the processor renders; each costs it over 0.1 s."""
 _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "software")
+_BROKE_OFF = "the encoder broke off; is the disk full?"
 _AZIMUTH = 125.0
 """Of the camera from the way that the robot faces at first, degrees."""
 _LOOK_AT_HEIGHT = 0.2
@@ -90,7 +92,7 @@ class Video:
             quality=8,
             pixelformat="yuv420p",  # what every player can show
             output_params=["-preset", "veryfast"],
-            ffmpeg_log_level="error",
+            ffmpeg_log_level="fatal",  # what it meets on the disk is told by us, in one line
         )
         try:
             if self._steps == 0:
@@ -136,6 +138,7 @@ class Video:
     def _complete(self) -> None:
         """Close the file, put the sound in, and give it its name even if that fails."""
         self._writer.close()
+        self._check_whole()
         try:
             if self._sound is not None:
                 add_sound(self._temporary, self._sound)
@@ -143,6 +146,15 @@ class Video:
             self.silent_because = str(error)
         finally:
             os.replace(self._temporary, self.path)
+
+    def _check_whole(self) -> None:
+        """Raise OSError unless every picture is in the file: closing it says nothing of that."""
+        try:
+            pictures, _ = imageio_ffmpeg.count_frames_and_secs(self._temporary)
+        except RuntimeError as error:
+            raise OSError(_BROKE_OFF) from error
+        if pictures != self._pictures:
+            raise OSError(_BROKE_OFF)
 
     def _append(self) -> None:
         try:
@@ -188,7 +200,8 @@ def _temporary_name(path: Path) -> Path:
 
 
 def _cannot_write(path: Path, error: OSError) -> MuteError:
-    reason = error.strerror or str(error).strip().splitlines()[0]
+    # An encoder that has ended leaves a broken pipe; imageio's error has no number then.
+    reason = error.strerror or _BROKE_OFF
     return MuteError(f"--video: cannot write {path}: {reason}")
 
 

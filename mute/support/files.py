@@ -49,10 +49,14 @@ def replace_file(path: Path, data: bytes | memoryview) -> None:
 
     The bytes go to `<name>.<pid>.tmp` in the same directory, reach the disk, and only then take the
     place of `path`. A failure removes that file; a process killed in between leaves it behind.
+    What is no file but a device or a pipe takes the bytes as they are.
 
     Raises:
         OSError: The file cannot be written.
     """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        path.write_bytes(data)
+        return
     temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
     try:
         with temporary.open("wb") as file:

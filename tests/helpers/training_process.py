@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -18,9 +17,8 @@ TINY += ["--agent.actor-hidden", "8", "--agent.critic-hidden", "8", "--agent.noi
 def start_training(*arguments: str, **how: Any) -> subprocess.Popen[str]:
     """Start `train.py`; `how` goes to `Popen`."""
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "cwd": REPOSITORY}
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(REPOSITORY)}
     command = [sys.executable, str(REPOSITORY / "train.py"), *TINY, *arguments]
-    return subprocess.Popen(command, env=environment, text=True, **(streams | how))
+    return subprocess.Popen(command, text=True, **(streams | how))
 
 
 def stop_after(process: subprocess.Popen[str], lines: int, how: signal.Signals) -> tuple[str, str]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 import yaml
 from learning_helpers import make_runner
+from places import REPOSITORY
 
 from mute.command_lines import evaluate, release
 from mute.evaluation.tables import read_json, write_json
@@ -48,7 +50,20 @@ def test_a_release_holds_policy_onnx_and_a_card_of_where_they_come_from(run, tmp
     assert told["resumed"] == ["python train.py --resume model_0.pt"]
     assert (told["seed"], told["iterations"], told["steps"]) == (3, 2, 2 * 8 * 8)
     assert (told["commit"], told["machine"]) == ("c" * 40, "a machine")
-    assert told["figures"] == {"policy": str(out / "go1_mute.pt")}
+    assert told["figures"] == {"policy": os.path.relpath(out / "go1_mute.pt", REPOSITORY)}
+
+
+def test_a_release_that_is_interrupted_leaves_the_files_of_the_last_one(run, tmp_path, monkeypatch):
+    def interrupt(argv):
+        raise KeyboardInterrupt
+
+    release.main(["--checkpoint", str(run / "model_0.pt"), "--out", str(tmp_path)])
+    before = {path: path.read_bytes() for path in tmp_path.glob("go1_mute.*")}
+    monkeypatch.setattr(evaluate, "main", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        release.main(["--checkpoint", str(run / "model_1.pt"), "--out", str(tmp_path)])
+    assert len(before) == 3
+    assert {path: path.read_bytes() for path in tmp_path.glob("go1_mute.*")} == before
 
 
 def test_a_policy_alone_cannot_be_released(run, tmp_path):

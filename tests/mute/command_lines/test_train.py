@@ -348,7 +348,7 @@ def test_a_checkpoint_that_later_ones_follow_is_not_resumed(finished, capsys):
         (["--agent.ppo.num-mini-batches", "0"], ["num_mini_batches", "0"]),
         (["--agent.activation", "foo"], ["activation", "foo"]),
         (["--agent.init-std", "-1.0"], ["init_std", "-1.0"]),
-        (["--env.height-map.spacing", "0.0"], ["height_map.spacing", "> 0", "0.0"]),
+        (["--env.height-map.spacing", "0.0"], ["height_map.spacing", ">= 0.01", "0.0"]),
         (["--env.rewards.landing-speed", "nan"], ["rewards.terms.landing_speed.weight", "nan"]),
         (
             ["--env.rewards.terms.foot-clearance.params.target", "0"],

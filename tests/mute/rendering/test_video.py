@@ -36,12 +36,14 @@ from mute.support.errors import MuteError
 UP, DOWN, LEFT, RIGHT = 265, 264, 263, 262  # GLFW's codes
 
 FILM = """
+import resource
 import sys
 from pathlib import Path
 import torch
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.rendering.video import Video
+from mute.support.errors import MuteError
 
 folder = Path(sys.argv[1])
 env = QuadrupedEnv(QuadrupedEnvCfg(num_envs=2, num_threads=1, random_heading=False))
@@ -56,6 +58,13 @@ try:
         raise ValueError("broken walk")
 except ValueError:
     print("broken walk")
+# No file may grow further, as on a full disk; the encoder finds out as it completes the film.
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
+try:
+    with Video(folder / "full.mp4", env) as video:
+        video.record()
+except MuteError as error:
+    print(error)
 """
 
 
@@ -111,9 +120,13 @@ def films(tmp_path_factory: pytest.TempPathFactory, environ: dict[str, str]) -> 
         check=False,
     )
     assert run.returncode == 0, run.stderr
-    reason, last = run.stdout.splitlines()
+    reason, walk, encoder = run.stdout.splitlines()
     assert "No such file" in reason
-    assert last == "broken walk"
+    assert walk == "broken walk"
+    assert encoder == (
+        f"--video: cannot write {folder / 'full.mp4'}: the encoder broke off; is the disk full?"
+    )
+    assert run.stderr == ""
     return folder
 
 
