@@ -37,6 +37,7 @@ from mute.command_lines.arguments import (
     make_directory,
     parse,
 )
+from mute.command_lines.policy_options import PolicyArgs
 from mute.command_lines.sound_options import load_audible_policy
 from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
@@ -47,8 +48,6 @@ from mute.evaluation.trials import evaluation_cfg, run_trial
 from mute.support.errors import MuteError
 from mute.support.provenance import REPOSITORY, current_commit, file_sha256, machine_kind
 from mute.support.ranges import Range
-from mute.support.resources import RESOURCES
-from mute.tasks import DEFAULT_TASK
 
 __all__ = ["CalibrationArgs", "fit_gain", "main", "provenance"]
 
@@ -61,11 +60,12 @@ are hard mineral slabs)."""
 
 
 @dataclass
-class CalibrationArgs:
-    """Fit one gain a floor to the levels that the paper measured."""
+class CalibrationArgs(PolicyArgs):
+    """Fit one gain a floor to the levels that the paper measured.
 
-    policy: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
-    """The reference: the policy that stands for the one the paper measured."""
+    The policy stands for the one that the paper measured.
+    """
+
     reference: Literal["mute", "dreamwaq"] = "mute"
     """The paper's row to fit: MUTE with beta = 0, or DreamWaQ."""
     speed: float = 0.5
@@ -91,6 +91,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     check_option("seconds", args.seconds, Range(2.0, LONGEST_WALK))
     check_option("speed", args.speed, Range(0.0, 1.0, above=True))
     check_seed(args.seed)
+    args = args.with_policy_found()
     policy = load_audible_policy(args.policy)
     make_directory(args.out.parent)
     if args.out.is_dir():

@@ -90,8 +90,7 @@ def _start(command: str, renders: bool = False, keeps_files: bool = False) -> No
     def main() -> int | None:
         _print_what_can_be()
         configure_threads()  # before torch is imported
-        if renders:
-            configure_rendering(sys.argv[1:])  # before mujoco is
+        configure_rendering(sys.argv[1:] if renders else [])  # before mujoco is
         with patient_output() if keeps_files else contextlib.nullcontext():
             return importlib.import_module(f"mute.command_lines.{command}").main()
 

@@ -18,6 +18,7 @@ from mute.command_lines.arguments import (
     check_seed,
     check_trials,
 )
+from mute.command_lines.policy_options import PolicyArgs
 from mute.controllers import LearnedController, load_policy
 from mute.controllers.learned import Policy
 from mute.envs.commands import BETA, CommandSampler
@@ -29,8 +30,6 @@ from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.trials import evaluation_cfg, run_trial
 from mute.support.provenance import REPOSITORY, machine_kind
 from mute.support.ranges import Range
-from mute.support.resources import RESOURCES
-from mute.tasks import DEFAULT_TASK
 
 __all__ = ["GaitArgs", "ProgressArgs", "gait", "progress"]
 
@@ -38,11 +37,9 @@ _SWEEP_ROBOTS = 300
 
 
 @dataclass
-class GaitArgs:
+class GaitArgs(PolicyArgs):
     """Walk over the command range, and at one actual speed for several betas."""
 
-    policy: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
-    """Policy to measure."""
     trials: int = 256
     """Robots that walk over the command range, for each beta."""
     seconds: float = 20.0
@@ -104,6 +101,7 @@ def progress(args: ProgressArgs) -> None:
 def gait(args: GaitArgs) -> None:
     """Measure a policy over the command range and at one speed."""
     _check(args)
+    args = args.with_policy_found()
     torch.set_num_threads(1)  # the physics engine has the cores
     policy = load_policy(args.policy)
     over_range = [_over_range(args, policy, beta) for beta in track(args.beta, "command range")]

@@ -28,6 +28,7 @@ from mute.command_lines.arguments import (
     check_wav,
     make_directory,
 )
+from mute.command_lines.policy_options import PolicyArgs
 from mute.command_lines.sound_options import (
     MicrophonePlace,
     Sources,
@@ -39,12 +40,11 @@ from mute.command_lines.sound_options import (
     tell_kept,
 )
 from mute.evaluation.noise_levels import SETTLE_TIME, NoiseRow, NoiseSetting, measure_noise
+from mute.evaluation.plotting import check_matplotlib
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.rendering.recordings import Recordings
 from mute.support.errors import MuteError
 from mute.support.ranges import Range
-from mute.support.resources import RESOURCES
-from mute.tasks import DEFAULT_TASK
 
 __all__ = ["NoiseArgs", "SweepBetaArgs", "SweepSpeedArgs", "noise", "sweep_beta", "sweep_speed"]
 
@@ -66,9 +66,7 @@ _Draw = Callable[[Sequence[NoiseRow], Path], list[Path]]
 
 
 @dataclass
-class _CommonArgs:
-    policy: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
-    """Policy to measure."""
+class _CommonArgs(PolicyArgs):
     trials: int = 5
     """Robots for each setting, side by side."""
     seconds: float = 10.0
@@ -145,6 +143,7 @@ def sweep_speed(args: SweepSpeedArgs) -> None:
     Raises:
         MuteError: If an argument is bad, or the policy cannot be used.
     """
+    check_matplotlib()
     from mute.evaluation.noise_figures import draw_speed_sweep  # matplotlib takes a second
 
     labels = [[f"speed{speed:g}-beta{beta:g}" for beta in args.beta for speed in args.speed]]
@@ -157,6 +156,7 @@ def sweep_beta(args: SweepBetaArgs) -> None:
     Raises:
         MuteError: If an argument is bad, or the policy cannot be used.
     """
+    check_matplotlib()
     from mute.evaluation.noise_figures import draw_beta_sweep
 
     labels = [[f"speed{args.speed:g}-beta{beta:g}" for beta in args.beta]]
@@ -190,6 +190,7 @@ def _run(
         Recordings(wav, video, tell)
         for wav, video in zip(_files(args.wav, labels), _files(args.video, labels), strict=True)
     ]
+    args = args.with_policy_found()
     origin = sound_origin(args.policy)
     rows = _measure(name, args, surfaces, settings, kept)
     _report(name, args, rows, origin, draw)

@@ -20,6 +20,7 @@ from mute.command_lines.arguments import (
     check_wav,
     make_directory,
 )
+from mute.command_lines.policy_options import PolicyArgs
 from mute.command_lines.sound_options import (
     MicrophonePlace,
     Sources,
@@ -33,23 +34,21 @@ from mute.command_lines.sound_options import (
 from mute.controllers import LearnedController
 from mute.evaluation.course.course import Course, load_course
 from mute.evaluation.course.long_walk import Walk, follow_course, make_walk_env
+from mute.evaluation.plotting import check_matplotlib
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.rendering.recordings import Recordings
 from mute.support.provenance import REPOSITORY
 from mute.support.resources import RESOURCES
-from mute.tasks import DEFAULT_TASK
 
 __all__ = ["WalkArgs", "walk"]
 
 
 @dataclass
-class WalkArgs:
+class WalkArgs(PolicyArgs):
     """Follow a course over several floors, and map the modelled levels along it."""
 
     course: Path = RESOURCES / "courses" / "office.yaml"
     """Course to walk: path, floors and speed (YAML)."""
-    policy: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
-    """Policy to measure."""
     beta: float = 0.5
     """Quiet factor."""
     hold_speed: bool = False
@@ -78,6 +77,8 @@ def walk(args: WalkArgs) -> None:
     check_sources(args.sources)
     check_wav(args.wav)
     check_video(args.video)
+    args = args.with_policy_found()
+    check_matplotlib()
     microphone = find_microphone(args.microphone)
     course, policy = load_course(args.course), load_audible_policy(args.policy)
     gains = load_gains()

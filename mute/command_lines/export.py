@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mute.command_lines.arguments import command_line, parse
+from mute.command_lines.policy_options import PolicyArgs
 from mute.controllers import load_policy
 from mute.controllers.onnx_export import export_policy
 
@@ -14,11 +15,9 @@ __all__ = ["ExportArgs", "main"]
 
 
 @dataclass
-class ExportArgs:
+class ExportArgs(PolicyArgs):
     """Arguments of the command line."""
 
-    policy: Path
-    """Checkpoint, or the small file that ships."""
     out: Path = Path("policy.onnx")
     """ONNX file to write or replace."""
 
@@ -31,6 +30,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     argv = command_line() if argv is None else argv
     args = parse(ExportArgs, argv, "Export a policy as one ONNX file.")
-    export_policy(load_policy(args.policy), args.out)
+    export_policy(load_policy(args.with_policy_found().policy), args.out)
     print(f"wrote {args.out}")
     return 0

@@ -18,7 +18,6 @@ from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
 from mute.acoustics.live_listener import LiveListener
 from mute.acoustics.soundscape import SOURCES
-from mute.checkpoint import latest_checkpoint
 from mute.command_lines.arguments import (
     LONGEST_WALK,
     MANY_ROBOTS,
@@ -30,6 +29,7 @@ from mute.command_lines.arguments import (
     parse,
 )
 from mute.command_lines.play_figures import live_captions, report, summary
+from mute.command_lines.policy_options import PolicyArgs
 from mute.command_lines.sound_options import (
     MicrophonePlace,
     Sources,
@@ -51,11 +51,9 @@ from mute.rendering.sound_track import temporary_sound
 from mute.rendering.video import Video
 from mute.support.errors import MuteError
 from mute.support.ranges import Range
-from mute.support.resources import RESOURCES
 from mute.support.signals import exit_status
 from mute.support.streams import patient_output
 from mute.support.threads import use_collection_threads
-from mute.tasks import DEFAULT_TASK, make_task
 
 __all__ = ["PlayArgs", "main"]
 
@@ -74,15 +72,11 @@ Where there is a display, a window opens; else figures are printed as it walks.
 
 
 @dataclass
-class PlayArgs:
+class PlayArgs(PolicyArgs):
     """Arguments of `play.py`."""
 
     beta: float = 0.5
     """Quiet factor: 0 for speed, 1 for silence."""
-    task: str | None = None
-    """Task whose shipped policy walks; go1_mute unless given."""
-    policy: Path | None = None
-    """Policy to run instead: a checkpoint, or 'latest' for the newest under runs/."""
     vx: float = 0.5
     """Forward velocity, m/s; from -2 to 2."""
     vy: float = 0.0
@@ -224,9 +218,7 @@ def _wants_window(args: PlayArgs) -> bool:
 
 
 def _make_session(args: PlayArgs, endless: bool) -> Session:
-    policy = load_policy(_policy_path(args))
-    if args.task is not None and policy.task != args.task:
-        raise MuteError(f"{_policy_path(args)} is of task {policy.task!r}, not {args.task!r}")
+    policy = load_policy(args.with_policy_found().policy)
     seconds = LONGEST_WALK if endless else args.seconds or _DEFAULT_SECONDS
     settle_time = min(_SETTLE_TIME, 0.5 * seconds)
     env = _make_env(args, policy, seconds)
@@ -272,25 +264,6 @@ def _make_listener(args: PlayArgs, env: QuadrupedEnv, settle_time: float) -> Liv
         find_microphone(args.microphone),
         args.sources,
     )
-
-
-def _policy_path(args: PlayArgs) -> Path:
-    """Return the file of the policy to run.
-
-    Raises:
-        MuteError: If there is no such task, or none ships for it.
-    """
-    task = args.task or DEFAULT_TASK
-    make_task(task)
-    if args.policy is None:
-        path = RESOURCES / "go1" / f"{task}.pt"
-        if not path.is_file():
-            raise MuteError(
-                f"no policy ships for task {task!r} ({path} is missing): learn one with "
-                f"python train.py --task {task}, or name one with --policy"
-            )
-        return path
-    return latest_checkpoint(Path("runs"), task) if str(args.policy) == "latest" else args.policy
 
 
 def _num_steps(args: PlayArgs, session: Session) -> int:

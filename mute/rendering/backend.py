@@ -36,15 +36,21 @@ _INSTALL = "on Debian: apt install libegl1 libgl1-mesa-dri, or libosmesa6"
 
 
 def configure_rendering(argv: Sequence[str]) -> None:
-    """Set `MUJOCO_GL` if the command line asks for a video; call it before mujoco is imported.
+    """Set `MUJOCO_GL` for what the command line asks; call it before mujoco is imported.
+
+    For a video it is what renders. Else nothing is rendered off-screen, and a value that MuJoCo
+    does not know, or whose libraries are missing, must not end its import.
 
     Raises:
         MuteError: If nothing on this machine renders off-screen; says what to install.
     """
     wants_video = any(word == "--video" or word.startswith("--video=") for word in argv)
+    given = os.environ.get("MUJOCO_GL", "")
     # Elsewhere than on Linux, MuJoCo has one way to render, and it needs no choice.
-    if wants_video and sys.platform == "linux":
+    if wants_video and (given or sys.platform == "linux"):
         os.environ["MUJOCO_GL"] = find_backend(os.environ)
+    elif given:
+        os.environ["MUJOCO_GL"] = "disable"
 
 
 def find_backend(environ: Mapping[str, str]) -> str:

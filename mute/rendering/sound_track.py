@@ -6,8 +6,7 @@ import os
 import subprocess
 from pathlib import Path
 
-import imageio_ffmpeg
-
+from mute.rendering.encoder import ffmpeg_program
 from mute.support.errors import MuteError
 
 __all__ = ["add_sound", "temporary_sound"]
@@ -32,7 +31,7 @@ def add_sound(film: Path, sound: Path) -> None:
         # its own, Ctrl-C reaches it through this process alone.
         run = subprocess.run(
             [
-                *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error"),
+                *(ffmpeg_program(), "-y", "-loglevel", "error"),
                 *("-i", film.absolute(), "-i", sound.absolute(), "-map", "0:v", "-map", "1:a"),
                 *("-c:v", "copy", "-c:a", "aac", "-b:a", _BITRATE, heard.absolute()),
             ],
@@ -46,7 +45,7 @@ def add_sound(film: Path, sound: Path) -> None:
         if run.returncode != 0:
             raise MuteError(_last_line(run.stderr) or f"ffmpeg ended with status {run.returncode}")
         os.replace(heard, film)
-    except (OSError, RuntimeError) as error:  # the latter where there is no ffmpeg
+    except OSError as error:
         raise MuteError(_last_line(str(error))) from error
     finally:
         heard.unlink(missing_ok=True)

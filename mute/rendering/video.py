@@ -20,6 +20,7 @@ import mujoco
 import numpy as np
 
 from mute.envs.quadruped_env import QuadrupedEnv
+from mute.rendering.encoder import ffmpeg_program
 from mute.rendering.sound_track import add_sound
 from mute.support.errors import MuteError
 
@@ -61,7 +62,7 @@ class Video:
             start: Time after which the film begins, s.
 
         Raises:
-            MuteError: If the path cannot be a video, or nothing renders.
+            MuteError: If the path cannot be a video, or nothing renders or encodes.
         """
         self.path = path
         self.silent_because = ""
@@ -71,6 +72,7 @@ class Video:
         self._env = env
         self._sound = sound
         self._robot = robot
+        ffmpeg_program()
         self._temporary = _temporary_name(path)
         self._steps = -round(start / env.step_dt)
         self._pictures = 0

@@ -203,8 +203,7 @@ def test_a_missing_policy_is_told_by_its_path(tmp_path):
         main(["--viewer", "none", "--policy", str(tmp_path / "nothing.pt")])
 
 
-def test_a_task_without_a_shipped_policy_says_how_to_learn_one(monkeypatch, tmp_path):
-    monkeypatch.setattr("mute.command_lines.play.RESOURCES", tmp_path)
+def test_a_task_without_a_shipped_policy_says_how_to_learn_one():
     with pytest.raises(MuteError, match=r"train\.py --task go1_mute_paper"):
         main(["--viewer", "none", "--task", "go1_mute_paper"])
 

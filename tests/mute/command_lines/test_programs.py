@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from places import REPOSITORY
@@ -50,3 +52,27 @@ entry_points.evaluate()
 """
     result = _run("-c", code, PYTHONIOENCODING="ascii", LC_ALL="C")
     assert (result.returncode, result.stdout, result.stderr) == (0, "59.6?0.1 dBA\n", "")
+
+
+@pytest.mark.parametrize("command", ["sweep-speed", "sweep-beta", "walk"])
+def test_a_backend_that_matplotlib_lacks_is_told_before_anything_is_measured(
+    command: str, tmp_path: Path
+):
+    words = ("evaluate.py", command, "--out", str(tmp_path / "out"))
+    result = _run(*words, MPLBACKEND="crayons")
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr == (
+        "error: MPLBACKEND=crayons is no backend of matplotlib's; unset it, figures go to files\n"
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_renderer_that_mujoco_lacks_is_no_matter_where_nothing_is_filmed(tmp_path: Path):
+    words = ("play.py", "--viewer", "none", "--seconds", "0.1", "--json")
+    result = _run(*words, MUJOCO_GL="crayons")
+    assert result.returncode == 0, result.stderr
+    assert json.loads(result.stdout)["seconds"] == 0.1
+    result = _run(*words, "--video", str(tmp_path / "walk.mp4"), MUJOCO_GL="crayons")
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr.startswith("error: --video: MUJOCO_GL=crayons does not render off-screen")
+    assert len(result.stderr.splitlines()) == 1
