@@ -58,6 +58,9 @@ class EstimatorPPO(PPO):
         A live module cannot come through rsl_rl's configuration, which is deep-copied.
         """
         self.env, self.trainer, self.ranks = env, trainer, ranks
+        # What rsl_rl's runner would say of ranks on GPUs; here they may learn on CPUs as well.
+        self.is_multi_gpu = ranks.several
+        self.gpu_world_size, self.gpu_global_rank = ranks.world_size, ranks.rank
         self._rollout_state: State = env.state_before
 
     def act(self, obs: TensorDict) -> torch.Tensor:

@@ -29,7 +29,7 @@ from mute.checkpoint import first_line
 from mute.support.errors import EXIT_USER_ERROR, MuteError
 from mute.support.signals import STOP_SIGNALS, exit_status
 
-__all__ = ["Ranks", "joined_ranks"]
+__all__ = ["Ranks", "joined_ranks", "unnoticed_ranks"]
 
 _TIMEOUT = timedelta(minutes=10)
 """Longest wait for the other ranks: many times a rollout, of which the slowest rank's counts."""
@@ -255,6 +255,20 @@ def joined_ranks() -> Iterator[Ranks]:
     finally:
         if torch.distributed.is_initialized():
             torch.distributed.destroy_process_group()
+
+
+@contextlib.contextmanager
+def unnoticed_ranks() -> Iterator[None]:
+    """Hide from rsl_rl's runner, as it is made, that there are others.
+
+    It would insist on CUDA and make a process group of its own.
+    """
+    size = os.environ.pop("WORLD_SIZE", None)
+    try:
+        yield
+    finally:
+        if size is not None:
+            os.environ["WORLD_SIZE"] = size
 
 
 def _started_ranks() -> Ranks:

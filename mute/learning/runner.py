@@ -18,7 +18,7 @@ from mute.config_versions import check_resumable
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.learning.algorithm import EstimatorPPO
-from mute.learning.distributed import Ranks
+from mute.learning.distributed import Ranks, unnoticed_ranks
 from mute.learning.estimated_env import EstimatedEnv, make_estimator
 from mute.learning.estimator_trainer import EstimatorTrainer
 from mute.learning.logger import TrainingLogger, quiet_writer_thread
@@ -83,7 +83,8 @@ class MuteRunner(OnPolicyRunner):
         if cfg.agent.symmetric:
             tie_estimator(env, estimator)
         estimated = EstimatedEnv(env, estimator, device, estimation.actor_uses_phase)
-        with contextlib.redirect_stdout(io.StringIO()):  # rsl_rl prints its networks
+        # rsl_rl prints its networks.
+        with contextlib.redirect_stdout(io.StringIO()), unnoticed_ranks():
             super().__init__(
                 estimated, cfg.agent.rsl_rl(), str(log_dir) if log_dir else None, device
             )
@@ -239,16 +240,6 @@ class MuteRunner(OnPolicyRunner):
         # A signal may reach one rank alone, or another one an iteration later.
         if self.ranks.any(self.stop.number is not None) and iteration + 1 < total:
             raise _StopTraining
-
-    def _configure_multi_gpu(self) -> None:
-        """Tell rsl_rl of the ranks; its own way insists on CUDA, and makes the process group."""
-        ranks = self.ranks
-        self.gpu_world_size, self.gpu_global_rank = ranks.world_size, ranks.rank
-        self.gpu_local_rank = ranks.local_rank
-        # Told otherwise, `learn` would do what `_agree` does, with a line on every rank's console.
-        self.is_distributed = False
-        sizes = {"global_rank": ranks.rank, "local_rank": ranks.local_rank}
-        self.cfg["multi_gpu"] = sizes | {"world_size": ranks.world_size} if ranks.several else None
 
     def _agree(self) -> None:
         """Give all ranks the first one's networks, and estimate anew with them."""

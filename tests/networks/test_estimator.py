@@ -248,6 +248,14 @@ def test_a_sequence_and_all_its_gradients_are_those_of_torchs_lstm():
     )
 
 
+def test_a_sequence_of_no_robots_is_empty():
+    obs, (hidden, cell), starts = _make_sequence()
+    state = (hidden[:0], cell[:0])
+    estimate, last = _make_estimator().unroll(obs[:, :0], state, starts[:, :0])
+    assert estimate.phase.shape == (NUM_STEPS, 0, 4)
+    assert last[0].shape == last[1].shape == (0, 8)
+
+
 def test_starts_of_another_shape_are_refused():
     obs, state, starts = _make_sequence()
     with pytest.raises(ValueError, match="starts"):

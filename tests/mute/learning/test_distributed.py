@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from learning_helpers import before_each_update, clone_tree, differences
+from learning_helpers import before_each_update, clone_tree, differences, make_cfg
 from places import REPOSITORY
 from ranks_at_work import (
     SPLIT_ENVS,
@@ -323,6 +323,18 @@ def test_an_environment_that_is_only_half_torchruns_is_refused_in_one_line(monke
     monkeypatch.delenv("RANK", raising=False)
     with pytest.raises(MuteError, match="start several processes with torchrun"), joined_ranks():
         pass
+
+
+def test_ranks_on_cpus_are_told_to_the_algorithm_and_not_to_the_runner_of_rsl_rl(monkeypatch):
+    monkeypatch.setenv("WORLD_SIZE", "2")  # rsl_rl would look for 'cuda:0'
+    runner = MuteRunner("go1_mute", make_cfg(), None, ranks=Ranks(1, 2))
+    assert (runner.is_distributed, os.environ["WORLD_SIZE"]) == (False, "2")
+    algorithm = runner.alg
+    assert (algorithm.is_multi_gpu, algorithm.gpu_world_size, algorithm.gpu_global_rank) == (
+        True,
+        2,
+        1,
+    )
 
 
 def test_a_mistake_in_the_program_is_not_taken_for_a_lost_rank():
