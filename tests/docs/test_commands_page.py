@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib
 import io
 import os
@@ -10,11 +11,15 @@ import re
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
 
 import pytest
 from places import REPOSITORY
 
 _PAGE = (REPOSITORY / "docs" / "commands.md").read_text()
+_PAGES = sorted([*REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").glob("*.md")])
+_OF_THE_TREE = ".ci/check_wheel.py"
+"""What is run from the checkout and is no command of MUTE's."""
 _MODULES = {
     "train.py": "mute.command_lines.train",
     "play.py": "mute.command_lines.play",
@@ -54,6 +59,7 @@ def _help(command: str) -> str:
     return printed.getvalue()
 
 
+@functools.cache
 def _offered(command: str) -> set[str]:
     """Return the options of a command: those that begin a line of its help."""
     lines = re.findall(r"^[│|\s]*((?:--?[\w.-]+(?: [A-Z_]+)?, )*--[\w.-]+)", _help(command), re.M)
@@ -67,6 +73,40 @@ def test_the_page_names_every_option_of_a_command_and_no_other(command):
     assert named <= offered, named - offered
     short = {name for name in offered if "." not in name and not name.startswith("--no-")}
     assert short - named == set()
+
+
+def _code_on(page: Path) -> list[str]:
+    """Return the lines of a page's blocks of code, and its code within sentences."""
+    text = page.read_text()
+    fenced = re.compile(r"^```\w*\n(.*?)^```", re.MULTILINE | re.DOTALL)
+    indented = [line for line in text.splitlines() if line.startswith("    ")]
+    inline = re.findall("`([^`\n]+(?:\n[^`\n]+)?)`", fenced.sub("", text))
+    return [*"".join(fenced.findall(text)).splitlines(), *indented, *inline]
+
+
+def _commands_on(page: Path) -> list[str]:
+    """Return what follows `python` in a page's code, without comments."""
+    code = (" ".join(line.split("  #")[0].split()) for line in _code_on(page))
+    commands = (re.search(r"(?:^|\s)python (.*)", line) for line in code)
+    return [found[1] for found in commands if found]
+
+
+@pytest.mark.parametrize("page", _PAGES, ids=[page.name for page in _PAGES])
+def test_a_command_that_any_page_gives_is_there_with_its_options(page):
+    for words in map(str.split, _commands_on(page)):
+        known = [
+            command for command in _sections() if words[: len(command.split())] == command.split()
+        ]
+        assert known or words[0] == _OF_THE_TREE, " ".join(words)
+        if known:
+            given = {word.split("=")[0] for word in words if word.startswith("--")} - {"--help"}
+            assert given <= _offered(known[0]), " ".join(words)
+
+
+@pytest.mark.parametrize("page", _PAGES, ids=[page.name for page in _PAGES])
+def test_a_field_that_any_page_names_as_an_option_is_there(page):
+    named = set(re.findall(r"--(?:env|agent)\.[a-z.-]*[a-z]", page.read_text()))
+    assert named <= _offered("train.py")
 
 
 def test_the_page_has_every_module_that_can_be_run():
