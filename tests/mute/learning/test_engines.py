@@ -19,6 +19,7 @@ from places import SHIPPED_POLICY
 from mute.checkpoint import CheckpointError
 from mute.controllers import LearnedController, load_policy
 from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.rewards import reward_term
 from mute.envs.sensors import past_readings, sensor_slice
 from mute.envs.warp_simulation import WarpSimulation
 from mute.evaluation.gait import GaitMeter
@@ -32,7 +33,8 @@ def _make_env(engine, num_envs):
     """Make robots with physics and observations as in training, and every reward at full weight."""
     cfg = evaluation_cfg(POLICY.cfg.env, num_envs, 30.0, seed=3, randomized=True)
     ramps = {"quiet_ramp": (0.0, 0.0), "lift_ramp": (0.0, 0.0), "guide_ramp": (50.0, 100.0)}
-    rewards = dataclasses.replace(cfg.rewards, phase_source="true", diagonal_support=0.7, **ramps)
+    terms = cfg.rewards.terms | {"diagonal_support": reward_term("diagonal_support", 0.7)}
+    rewards = dataclasses.replace(cfg.rewards, phase_source="true", terms=terms, **ramps)
     env = QuadrupedEnv(dataclasses.replace(cfg, engine=engine, num_threads=1, rewards=rewards))
     command = torch.zeros(num_envs, 4)
     command[:, 0] = torch.linspace(-0.6, 0.8, num_envs)
