@@ -15,7 +15,6 @@ import tyro
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
 from mute.acoustics.origin import sound_origin
-from mute.acoustics.soundscape import SOURCES
 from mute.command_lines.arguments import (
     Numbers,
     Words,
@@ -28,11 +27,8 @@ from mute.command_lines.arguments import (
     check_wav,
     make_directory,
 )
-from mute.command_lines.policy_options import PolicyArgs
 from mute.command_lines.sound_options import (
-    MicrophonePlace,
-    Sources,
-    check_sources,
+    SoundArgs,
     find_microphone,
     load_audible_policy,
     progress_bar,
@@ -66,15 +62,13 @@ _Draw = Callable[[Sequence[NoiseRow], Path], list[Path]]
 
 
 @dataclass
-class _CommonArgs(PolicyArgs):
+class _CommonArgs(SoundArgs):
     trials: int = 5
     """Robots for each setting, side by side."""
     seconds: float = 10.0
     """Measured length of a trial, s."""
     seed: int = 1
     """Seed of initial states and of the noise."""
-    sources: Sources = SOURCES
-    microphone: MicrophonePlace = "trunk"
     out: Path = Path("evaluation")
     """Directory of the files that are written."""
 
@@ -315,8 +309,7 @@ def _check(
     check_trials(args.trials, args.seconds)
     check_seed(args.seed)
     check_betas(betas)
-    check_sources(args.sources)
-    find_microphone(args.microphone)
+    args.check_sound()
     for option, values in (("surface", surfaces), ("beta", betas), ("speed", speeds)):
         check_distinct(option, values)
     for surface in surfaces:

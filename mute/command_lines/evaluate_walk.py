@@ -12,7 +12,6 @@ import torch
 
 from mute.acoustics.gains import load_gains
 from mute.acoustics.origin import sound_origin
-from mute.acoustics.soundscape import SOURCES
 from mute.command_lines.arguments import (
     check_betas,
     check_seed,
@@ -20,11 +19,8 @@ from mute.command_lines.arguments import (
     check_wav,
     make_directory,
 )
-from mute.command_lines.policy_options import PolicyArgs
 from mute.command_lines.sound_options import (
-    MicrophonePlace,
-    Sources,
-    check_sources,
+    SoundArgs,
     find_microphone,
     load_audible_policy,
     progress_bar,
@@ -44,7 +40,7 @@ __all__ = ["WalkArgs", "walk"]
 
 
 @dataclass
-class WalkArgs(PolicyArgs):
+class WalkArgs(SoundArgs):
     """Follow a course over several floors, and map the modelled levels along it."""
 
     course: Path = RESOURCES / "courses" / "office.yaml"
@@ -56,8 +52,6 @@ class WalkArgs(PolicyArgs):
     that different betas walk equally fast; unless given, the command is the course's speed."""
     seed: int = 1
     """Seed of the initial state and of the noise."""
-    sources: Sources = SOURCES
-    microphone: MicrophonePlace = "trunk"
     out: Path = Path("evaluation")
     """Directory of the files that are written."""
     wav: Path | None = None
@@ -74,7 +68,7 @@ def walk(args: WalkArgs) -> None:
     """
     check_betas([args.beta])
     check_seed(args.seed)
-    check_sources(args.sources)
+    args.check_sound()
     check_wav(args.wav)
     check_video(args.video)
     args = args.with_policy_found()

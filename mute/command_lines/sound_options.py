@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +17,7 @@ from mute.acoustics import soundscape
 from mute.acoustics.audible_env import listening_cfg
 from mute.acoustics.microphone import Microphone
 from mute.command_lines.arguments import Words, check_distinct
+from mute.command_lines.policy_options import PolicyArgs
 from mute.controllers import load_policy
 from mute.controllers.learned import Policy
 from mute.rendering.recordings import Recordings
@@ -23,6 +25,7 @@ from mute.support.errors import MuteError
 
 __all__ = [
     "MicrophonePlace",
+    "SoundArgs",
     "Sources",
     "check_sources",
     "find_microphone",
@@ -45,6 +48,24 @@ MicrophonePlace = Annotated[
     ),
 ]
 """Type of the option --microphone."""
+
+
+@dataclass
+class SoundArgs(PolicyArgs):
+    """The arguments of every evaluation of what a policy sounds like."""
+
+    sources: Sources = soundscape.SOURCES
+    microphone: MicrophonePlace = "trunk"
+
+    def check_sound(self) -> None:
+        """Check --sources and --microphone.
+
+        Raises:
+            MuteError: If one is bad.
+        """
+        check_sources(self.sources)
+        find_microphone(self.microphone)
+
 
 _FARTHEST = 100.0
 """Largest coordinate of a microphone, m."""
