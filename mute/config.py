@@ -208,6 +208,7 @@ class AgentCfg:
         }
         return {
             "num_steps_per_env": self.num_steps_per_env,
+            "check_for_nan": False,  # see `EstimatorPPO.process_env_step`
             "save_interval": self.save_interval,
             "obs_groups": {
                 "actor": ["policy", "estimate"],

@@ -15,6 +15,7 @@ from mute.envs.observations import OBS_DIM
 from mute.envs.quadruped_env import NUM_ACTIONS
 from mute.learning.estimated_env import estimate_group, make_estimator
 from mute.learning.model import PreparedModel
+from mute.learning.saved_state import check_form, check_iteration, check_weights, entry
 from mute.networks.estimator import Estimate, Estimator
 
 __all__ = ["LearnedController", "Policy", "load_policy", "make_policy"]
@@ -45,7 +46,7 @@ def load_policy(path: Path) -> Policy:
     saved = load_checkpoint(path)
     try:
         return make_policy(saved)
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+    except (ValueError, RuntimeError) as error:
         reason = first_line(error)
         raise CheckpointError(f"{path} holds no policy that fits this version: {reason}") from error
 
@@ -54,14 +55,19 @@ def make_policy(saved: dict[str, Any]) -> Policy:
     """Make a policy of its own, on the CPU, from what `runner.policy_part` returns.
 
     Raises:
-        KeyError, TypeError, ValueError or RuntimeError: If that is incomplete or does not fit.
+        ValueError: If that is incomplete, does not fit, or has weights that are not finite.
+        RuntimeError: If there is no memory for such networks.
     """
-    cfg = from_plain(saved["config"])
+    task, iteration = entry(saved, "task"), check_iteration(saved)
+    check_form(task, "", "task")
+    cfg = from_plain(entry(saved, "config"))
     estimator = make_estimator(cfg)
-    estimator.load_state_dict(saved["estimator_state_dict"])
     actor = _actor(cfg, estimator)
-    actor.load_state_dict(saved["actor_state_dict"])
-    return Policy(saved["task"], cfg, saved["iter"], estimator.eval(), actor.eval())
+    for name, network in (("estimator", estimator), ("actor", actor)):
+        weights = entry(saved, f"{name}_state_dict")
+        check_weights(weights, network, f"{name}_state_dict")
+        network.load_state_dict(weights)
+    return Policy(task, cfg, iteration, estimator.eval(), actor.eval())
 
 
 class LearnedController:

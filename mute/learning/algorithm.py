@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import chain
 from typing import Any
 
@@ -9,8 +10,10 @@ import torch
 from rsl_rl.algorithms import PPO
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
+from torch import Tensor
 
 from mute.learning.distributed import Ranks
+from mute.learning.divergence import DivergedError, first_not_finite
 from mute.learning.estimated_env import EstimatedEnv
 from mute.learning.estimator_trainer import EstimatorTrainer
 from mute.learning.model import PreparedModel
@@ -26,7 +29,8 @@ class EstimatorPPO(PPO):
     """PPO whose update first trains the estimator, on the rollout before the stored one.
 
     The actor and the critic read the estimates as they were stored, so the probability ratio is 1
-    on the first mini-batch, and no gradient of theirs reaches the estimator.
+    on the first mini-batch, and no gradient of theirs reaches the estimator. An update after which
+    something is not finite ends with a `DivergedError`, on all ranks.
     """
 
     actor: PreparedModel  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -37,6 +41,12 @@ class EstimatorPPO(PPO):
     """What the estimator learns by."""
     ranks: Ranks
     """Processes that learn together."""
+    optimizer: FusedAdam  # pyright: ignore[reportIncompatibleVariableOverride]
+    """What actor and critic learn by."""
+    updates: int = 0
+    """Number of updates that went well."""
+    _met: str | None = None
+    """What the rollout brought that is not finite."""
 
     @staticmethod
     def construct_algorithm(obs: TensorDict, env: VecEnv, cfg: dict, device: str) -> EstimatorPPO:
@@ -70,6 +80,18 @@ class EstimatorPPO(PPO):
             use_learning_threads()  # whatever ran between two rollouts; the environment keeps them
         return super().act(obs)
 
+    def process_env_step(
+        self, obs: TensorDict, rewards: Tensor, dones: Tensor, extras: dict[str, Tensor]
+    ) -> None:
+        """Record a step, see `PPO.process_env_step`; remember what of it is not finite.
+
+        The runner's own check would end one rank alone, blame the environment, and pass infinity.
+        """
+        if self._met is None:
+            groups = {f"observations '{name}'": obs[name] for name in obs.keys()}  # noqa: SIM118
+            self._met = first_not_finite(groups | {"rewards": rewards})
+        super().process_env_step(obs, rewards, dones, extras)
+
     def compute_returns(self, obs: TensorDict) -> None:
         """Compute returns and advantages, see `PPO.compute_returns`.
 
@@ -85,14 +107,55 @@ class EstimatorPPO(PPO):
         self.storage.advantages = centred / (variance.sqrt() + 1e-8)
 
     def update(self) -> dict[str, float]:
-        """Train the estimator, then actor and critic; return the mean losses and errors."""
+        """Train the estimator, then actor and critic; return the mean losses and errors.
+
+        Raises:
+            DivergedError: If a loss, a weight or an estimate is not finite, on whatever rank.
+        """
         use_learning_threads()
         # Clones made outside inference mode are ordinary tensors, which autograd accepts.
         hidden, cell = self._rollout_state
         losses = self.trainer.update(self.storage, (hidden.clone(), cell.clone()), self.ranks)
         losses |= super().update()
         self.env.refresh()
+        self._stop_where_not_finite(losses)
+        self.updates += 1
         return losses
+
+    def set_learning_rates(self, ppo: float | None, estimator: float) -> None:
+        """Go on with other learning rates; without one of PPO, its own stays."""
+        self.trainer.optimizer.set_learning_rate(estimator)
+        if ppo is not None:
+            self.learning_rate = ppo
+            self.optimizer.set_learning_rate(ppo)
+
+    def weights_not_finite(self) -> str | None:
+        """Return the name of the first network that holds NaN or infinity; None if none does."""
+        networks = {
+            "actor": self.actor,
+            "critic": self.critic,
+            "estimator": self.trainer.estimator,
+        }
+        values = {
+            f"weights of the {name} ({key})": value
+            for name, network in networks.items()
+            for key, value in network.state_dict().items()
+        }
+        return first_not_finite(values)
+
+    def _stop_where_not_finite(self, losses: dict[str, float]) -> None:
+        broken = [name for name, value in losses.items() if not math.isfinite(value)]
+        estimate = self.env.get_observations()["estimate"]
+        found = (
+            self._met
+            or (f"loss '{broken[0]}'" if broken else None)
+            or self.weights_not_finite()
+            or first_not_finite({"estimates": estimate})
+        )
+        # The others would wait for one that stops alone.
+        if self.ranks.any(found is not None):
+            met = [one for one in self.ranks.gather(found) if one is not None]
+            raise DivergedError(f"{self.ranks.broadcast(met[0] if met else '')} not finite")
 
     def train_mode(self) -> None:
         """Set train mode for all networks."""

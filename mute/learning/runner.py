@@ -13,15 +13,18 @@ import torch
 from rsl_rl.runners import OnPolicyRunner
 
 from mute.checkpoint import CheckpointError, first_line, load_checkpoint, save_checkpoint
-from mute.config import TaskCfg, to_plain
+from mute.config import AgentCfg, TaskCfg, from_plain, to_plain
 from mute.config_versions import check_resumable
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.learning.algorithm import EstimatorPPO
 from mute.learning.distributed import Ranks, unnoticed_ranks
+from mute.learning.divergence import DivergedError
 from mute.learning.estimated_env import EstimatedEnv, make_estimator
 from mute.learning.estimator_trainer import EstimatorTrainer
 from mute.learning.logger import TrainingLogger, quiet_writer_thread
+from mute.learning.resumption import check_resumption
+from mute.learning.saved_state import check_learner, check_own_state, check_totals, entry
 from mute.learning.symmetry import groups, tie_actor_critic, tie_estimator
 from mute.support.signals import StopRequest
 from mute.support.threads import core_share, use_collection_threads
@@ -33,6 +36,17 @@ Progress = Callable[[int, int, dict[str, float]], None]
 NoiseProbe = Callable[[dict[str, Any]], dict[str, float]]
 """Takes a `policy_part` and returns the modelled noise levels of its policy by curve, dBA. It uses
 no random numbers of torch's common generator but such as it puts back."""
+
+_DOES_NOT_FIT = (
+    AttributeError,
+    IndexError,
+    KeyError,
+    OverflowError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+"""What a state of another form than its own can make torch and the loaders raise."""
 
 _POLICY_KEYS = ("task", "config", "iter", "actor_state_dict", "estimator_state_dict")
 
@@ -151,7 +165,15 @@ class MuteRunner(OnPolicyRunner):
         return Path(self.logger.log_dir) / f"model_{self.current_learning_iteration}.pt"
 
     def save(self, path: str, infos: dict | None = None) -> None:
-        """Save all that is needed to continue bit for bit, atomically; the first rank writes."""
+        """Save all that is needed to continue bit for bit, atomically; the first rank writes.
+
+        Raises:
+            CheckpointError: If it cannot be written.
+            DivergedError: If a weight is not finite; nothing is written then.
+        """
+        broken = self.alg.weights_not_finite()
+        if broken is not None:
+            raise DivergedError(f"{broken} not finite, so {path} is not written")
         with self.stop.finishing():
             self._save(Path(path), infos)
 
@@ -191,19 +213,26 @@ class MuteRunner(OnPolicyRunner):
         # to where they are, and the random states stay where they belong.
         checkpoint = load_checkpoint(Path(path), map_location or "cpu")
         try:
-            if self.task_cfg.agent.symmetric and not checkpoint["config"]["agent"]["symmetric"]:
-                raise ValueError("agent.symmetric is true, and its networks were trained without")
-            check_resumable(checkpoint["config"])
+            check_resumable(entry(checkpoint, "config"))
+            saved_cfg = from_plain(checkpoint["config"])
             own = _part_of_rank(checkpoint, self.ranks)
+            check_resumption(saved_cfg, self.task_cfg, robots_anew=own is None)
+            check_learner(checkpoint, self.alg)
+            if own is None:
+                check_totals(checkpoint)
+            else:
+                check_own_state(own, self._own_state(), self.alg)
             checkpoint["estimator_trainer"]["past"] = {} if own is None else own["estimator_past"]
             self.alg.load(checkpoint, load_cfg, strict)
+            self._set_learning_rates(saved_cfg.agent)
             if own is None:
                 self.env.restart(checkpoint["env"]["env"]["step_count"])
                 self.logger.load_totals(checkpoint["logger"])
             else:
                 self._load_own_state(own)
-        except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
-            reason = first_line(error)
+        except _DOES_NOT_FIT as error:
+            missing = " is missing" if isinstance(error, KeyError) else ""
+            reason = f"{first_line(error)}{missing}"
             raise CheckpointError(f"{path} does not fit this configuration: {reason}") from error
         self.robots_anew = own is None
         # The saved iteration is finished.
@@ -211,6 +240,13 @@ class MuteRunner(OnPolicyRunner):
         # What was logged after the checkpoint is learnt, and logged, again.
         self.cfg["logger"]["first_iteration"] = self.current_learning_iteration
         return checkpoint["infos"] or {}
+
+    def _set_learning_rates(self, saved: AgentCfg) -> None:
+        """Go on with the configured learning rates, but where the schedule has led PPO's on."""
+        agent = self.task_cfg.agent
+        asked = agent.ppo.learning_rate
+        goes_on = agent.ppo.schedule == "adaptive" and asked == saved.ppo.learning_rate
+        self.alg.set_learning_rates(None if goes_on else asked, agent.estimation.learning_rate)
 
     @property
     def _on_cuda(self) -> bool:
@@ -275,8 +311,12 @@ def _own_share(cfg: QuadrupedEnvCfg, ranks: Ranks) -> QuadrupedEnvCfg:
 
 def _part_of_rank(checkpoint: dict[str, Any], ranks: Ranks) -> dict[str, Any] | None:
     """Return what a rank saved of its own; None if those who saved were more or fewer."""
-    first = checkpoint | {"estimator_past": checkpoint["estimator_trainer"]["past"]}
-    parts = [first, *checkpoint.get("other_ranks", [])]
+    trainer = entry(checkpoint, "estimator_trainer")
+    first = checkpoint | {"estimator_past": entry(trainer, "past", "estimator_trainer")}
+    others = checkpoint.get("other_ranks", [])
+    if not isinstance(others, list):
+        raise ValueError("other_ranks must be a list")
+    parts = [first, *others]
     return parts[ranks.rank] if len(parts) == ranks.world_size else None
 
 
