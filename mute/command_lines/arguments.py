@@ -29,6 +29,7 @@ __all__ = [
     "check_wav",
     "command_line",
     "current_spelling",
+    "is_given",
     "make_directory",
     "parse",
     "resolve_device",
@@ -103,6 +104,16 @@ def _current_option(word: str) -> str:
     option, equals, value = word.removeprefix("--").partition("=")
     moved = MOVED.get(option.replace("-", "_"))
     return f"--{moved.replace('_', '-')}{equals}{value}" if moved else word
+
+
+def is_given(option: str, argv: Sequence[str]) -> bool:
+    """Tell whether a command line has an option, with whatever value.
+
+    Args:
+        option: Its name, with the dashes.
+        argv: Words of the command line.
+    """
+    return any(word.partition("=")[0].replace("_", "-") == option for word in argv)
 
 
 def selected_task(argv: Sequence[str], default: str) -> str:

@@ -15,18 +15,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from mute.checkpoint import CheckpointError, load_checkpoint, save_checkpoint
 from mute.command_lines import evaluate
 from mute.command_lines.arguments import command_line, parse
 from mute.controllers import load_policy
 from mute.controllers.onnx_export import export_policy
 from mute.evaluation.tables import read_json, write_json
+from mute.learning.run_directory import read_parameters
 from mute.learning.runner import policy_part
+from mute.learning.saved_state import check_totals
 from mute.support.files import write_file
 from mute.support.provenance import REPOSITORY
 from mute.support.resources import RESOURCES
+from mute.tasks import make_task
 
 __all__ = ["ReleaseArgs", "main"]
 
@@ -52,7 +53,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     checkpoint = load_checkpoint(args.checkpoint)
     if "logger" not in checkpoint:
         raise CheckpointError(f"{args.checkpoint} holds a policy only, not a training")
-    name = checkpoint["task"]
+    _check_training(args.checkpoint, checkpoint)
+    name = load_policy(args.checkpoint).task
+    make_task(name)  # the name of the files
     training = _training(args.checkpoint, checkpoint)
     # Whoever interrupts the measurement finds the files of the last release, which belong together.
     with tempfile.TemporaryDirectory() as folder:
@@ -70,22 +73,30 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _training(path: Path, checkpoint: dict[str, Any]) -> dict[str, Any]:
     """Return what made the policy, from its checkpoint and its run's parameters."""
-    parameters = path.parent / "config.yaml"
-    try:
-        run = yaml.safe_load(parameters.read_text())
-    except OSError as error:
-        raise CheckpointError(f"{path} lies outside its run: no {parameters}") from error
+    run = read_parameters(path.parent)
+    if run is None:
+        raise CheckpointError(f"{path} lies outside its run: no config.yaml beside it")
+    for entry in (run, *run.get("resumed", [])):
+        if not isinstance(entry.get("command"), str):
+            raise CheckpointError(f"{path}: its run's config.yaml does not tell every command")
     return {
         "task": checkpoint["task"],
         "command": _without_places(run["command"]),
         "resumed": [_without_places(entry["command"]) for entry in run.get("resumed", [])],
         "seed": checkpoint["config"]["env"]["seed"],
-        "commit": run["commit"],
-        "machine": run["machine"],
+        "commit": run.get("commit"),
+        "machine": run.get("machine"),
         "iterations": checkpoint["iter"] + 1,
         "steps": checkpoint["logger"]["total_steps"],
         "wall_time_minutes": round(checkpoint["logger"]["total_time"] / 60.0, 1),
     }
+
+
+def _check_training(path: Path, checkpoint: dict[str, Any]) -> None:
+    try:
+        check_totals(checkpoint)
+    except ValueError as error:
+        raise CheckpointError(f"{path} holds no training: {error}") from error
 
 
 def _without_places(command: str) -> str:

@@ -21,6 +21,7 @@ from mute.checkpoint import (
 from mute.command_lines.arguments import (
     command_line,
     current_spelling,
+    is_given,
     parse,
     resolve_device,
     selected_task,
@@ -36,18 +37,21 @@ from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.evaluation.noise_probe import NoiseProbe
 from mute.learning.displays import LiveDisplay, PlainDisplay
 from mute.learning.distributed import Ranks, joined_ranks
+from mute.learning.divergence import DivergedError
 from mute.learning.run_directory import (
     claim_run,
     give_up_run,
     last_saved,
     plan_run,
     program_name,
+    read_parameters,
     resume_hint,
     started_command,
     write_parameters,
 )
 from mute.learning.runner import MuteRunner, Progress
-from mute.support.errors import MuteError
+from mute.learning.saved_state import check_iteration
+from mute.support.errors import EXIT_USER_ERROR, MuteError
 from mute.support.files import DiskError
 from mute.tasks import DEFAULT_TASK, make_task
 
@@ -106,6 +110,7 @@ def _learn(argv: Sequence[str], ranks: Ranks, command: Sequence[str]) -> int:
         cfg = _configuration(args)
         kind = resolve_device(args.device)
         torch.set_float32_matmul_precision(cfg.agent.matmul_precision)
+        before = read_parameters(checkpoint.parent) if checkpoint else None
         runs = args.log_dir / args.task
         run_dir = checkpoint.parent if checkpoint else plan_run(runs, args.run_name, start)
         display = PlainDisplay() if args.plain or not ranks.first else LiveDisplay(args.task)
@@ -114,12 +119,19 @@ def _learn(argv: Sequence[str], ranks: Ranks, command: Sequence[str]) -> int:
         runner = _make_runner(args, cfg, run_dir, ranks, kind, display.update)
         if checkpoint:
             _resume(runner, checkpoint)
+            if is_given("--agent.ppo.learning-rate", argv):
+                runner.alg.learn_at(cfg.agent.ppo.learning_rate)
     same = (to_plain(cfg), kind, str(run_dir), runner.current_learning_iteration)
     ranks.check_equal("configuration or checkpoint", same)
     with ranks.together():
         if ranks.first:
             written = [*command[:-1], Path(command[-1]).name, *argv]
-            run_dir = _begin_run(args, cfg, run_dir, written)
+            if checkpoint:  # in its old directory, and only once nothing can refuse it any more
+                runner.on_begin = lambda: write_parameters(
+                    checkpoint.parent, args.task, cfg, written, before
+                )
+            else:
+                run_dir = _begin_run(args, cfg, run_dir, written)
     run_dir = ranks.broadcast(run_dir)
     runner.keep_in(run_dir)
     if checkpoint and runner.robots_anew:
@@ -139,13 +151,10 @@ def _learn(argv: Sequence[str], ranks: Ranks, command: Sequence[str]) -> int:
 
 
 def _begin_run(args: TrainArgs, cfg: TaskCfg, run_dir: Path, command: Sequence[str]) -> Path:
-    """Make the directory of a new run, or go on in that of an old one; return it."""
-    if args.resume is not None:
-        write_parameters(run_dir, args.task, cfg, command, resumed=True)
-        return run_dir
+    """Make the directory of a new run and return it."""
     run_dir = claim_run(run_dir, named=bool(args.run_name))
     try:
-        write_parameters(run_dir, args.task, cfg, command, resumed=False)
+        write_parameters(run_dir, args.task, cfg, command)
     except BaseException:
         give_up_run(run_dir)
         raise
@@ -161,12 +170,15 @@ def _train(
     """Learn; return False if interrupted.
 
     Raises:
-        MuteError: If the disk refuses, or a rank is gone; it says from where to go on.
+        MuteError: If the disk refuses, a rank is gone, or what is learnt is no longer finite; it
+            says from where to go on.
     """
     try:
         with display, ranks.watched(advice):
             return runner.train()
-    except (CheckpointError, DiskError) as error:
+    except (CheckpointError, DiskError, DivergedError) as error:
+        if isinstance(error, DivergedError) and not ranks.first:  # all stop, and one speaks
+            raise SystemExit(EXIT_USER_ERROR) from None
         raise MuteError(f"{error}; {advice()}") from error
 
 
@@ -219,8 +231,12 @@ def _arguments(argv: Sequence[str]) -> tuple[TrainArgs, Path | None]:
         cfg = from_plain(saved.get("config"))
     except ValueError as error:
         raise CheckpointError(f"{path}: {error}") from error
+    try:
+        iteration = check_iteration(saved)
+    except ValueError as error:
+        raise CheckpointError(f"{path} cannot be resumed: {error}") from error
     args = _parse(argv, task, cfg)
-    _check_resume(args, path, cfg.env.seed, saved["iter"])
+    _check_resume(args, path, cfg.env.seed, iteration)
     return args, path
 
 

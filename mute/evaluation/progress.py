@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mute.checkpoint import CheckpointError, load_checkpoint
+from mute.learning.saved_state import check_totals
 
 __all__ = ["Milestone", "checkpoints_of", "training_minutes", "walks"]
 
@@ -51,6 +52,10 @@ def training_minutes(path: Path) -> float:
     checkpoint = load_checkpoint(path)
     if "logger" not in checkpoint:
         raise CheckpointError(f"{path} holds a policy only, not a training")
+    try:
+        check_totals(checkpoint)
+    except ValueError as error:
+        raise CheckpointError(f"{path} holds no training: {error}") from error
     return checkpoint["logger"]["total_time"] / 60.0
 
 

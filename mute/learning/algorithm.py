@@ -13,7 +13,7 @@ from tensordict import TensorDict
 from torch import Tensor
 
 from mute.learning.distributed import Ranks
-from mute.learning.divergence import DivergedError, first_not_finite
+from mute.learning.divergence import DivergedError, first_not_finite, stopped_by
 from mute.learning.estimated_env import EstimatedEnv
 from mute.learning.estimator_trainer import EstimatorTrainer
 from mute.learning.model import PreparedModel
@@ -88,8 +88,8 @@ class EstimatorPPO(PPO):
         The runner's own check would end one rank alone, blame the environment, and pass infinity.
         """
         if self._met is None:
-            groups = {f"observations '{name}'": obs[name] for name in obs.keys()}  # noqa: SIM118
-            self._met = first_not_finite(groups | {"rewards": rewards})
+            groups = {f"the observations '{name}'": obs[name] for name in obs.keys()}  # noqa: SIM118
+            self._met = first_not_finite(groups | {"the rewards": rewards})
         super().process_env_step(obs, rewards, dones, extras)
 
     def compute_returns(self, obs: TensorDict) -> None:
@@ -122,12 +122,10 @@ class EstimatorPPO(PPO):
         self.updates += 1
         return losses
 
-    def set_learning_rates(self, ppo: float | None, estimator: float) -> None:
-        """Go on with other learning rates; without one of PPO, its own stays."""
-        self.trainer.optimizer.set_learning_rate(estimator)
-        if ppo is not None:
-            self.learning_rate = ppo
-            self.optimizer.set_learning_rate(ppo)
+    def learn_at(self, learning_rate: float) -> None:
+        """Go on with another learning rate of PPO's."""
+        self.learning_rate = learning_rate
+        self.optimizer.set_learning_rate(learning_rate)
 
     def weights_not_finite(self) -> str | None:
         """Return the name of the first network that holds NaN or infinity; None if none does."""
@@ -137,7 +135,7 @@ class EstimatorPPO(PPO):
             "estimator": self.trainer.estimator,
         }
         values = {
-            f"weights of the {name} ({key})": value
+            f"the weights of the {name} ({key})": value
             for name, network in networks.items()
             for key, value in network.state_dict().items()
         }
@@ -148,14 +146,14 @@ class EstimatorPPO(PPO):
         estimate = self.env.get_observations()["estimate"]
         found = (
             self._met
-            or (f"loss '{broken[0]}'" if broken else None)
+            or (f"the loss '{broken[0]}'" if broken else None)
             or self.weights_not_finite()
-            or first_not_finite({"estimates": estimate})
+            or first_not_finite({"the estimates": estimate})
         )
         # The others would wait for one that stops alone.
         if self.ranks.any(found is not None):
             met = [one for one in self.ranks.gather(found) if one is not None]
-            raise DivergedError(f"{self.ranks.broadcast(met[0] if met else '')} not finite")
+            raise DivergedError(stopped_by(self.ranks.broadcast(met[0] if met else "")))
 
     def train_mode(self) -> None:
         """Set train mode for all networks."""

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from mute.support.errors import MuteError
 
-__all__ = ["DivergedError", "first_not_finite"]
+__all__ = ["DivergedError", "first_not_finite", "stopped_by"]
 
 
 class DivergedError(MuteError):
@@ -25,3 +25,16 @@ def first_not_finite(values: Mapping[str, Tensor]) -> str | None:
     if bool(torch.stack(flags).all()):
         return None
     return next(name for name, finite in zip(values, flags, strict=True) if not finite)
+
+
+def stopped_by(found: str) -> str:
+    """Return in words why a training stops, and which option may keep it from that.
+
+    Args:
+        found: Name of what holds NaN or infinity.
+    """
+    option = "estimation" if "estimat" in found else "ppo"
+    return (
+        f"NaN or infinity in {found}, so the training stops and keeps nothing of this iteration; "
+        f"a smaller --agent.{option}.learning-rate may help"
+    )

@@ -127,6 +127,7 @@ class TrainingLogger(Logger):
         self,
         *args: Any,  # noqa: ANN401
         measure: Callable[[int], dict[str, float]],
+        on_begin: Callable[[], None],
         on_iteration: Callable[[int, int, dict[str, float]], None],
         ranks: Ranks,
         **kwargs: Any,  # noqa: ANN401
@@ -136,6 +137,7 @@ class TrainingLogger(Logger):
         Args:
             *args: What `Logger` takes.
             measure: Called with an iteration; returns further scalars for its curves.
+            on_begin: Called once the curves are open, before the first iteration.
             on_iteration: Called with (iteration, total, scalars) at the end of each.
             ranks: Processes whose mean figures are logged.
             **kwargs: What `Logger` takes.
@@ -151,6 +153,7 @@ class TrainingLogger(Logger):
         kept = max(1, 100 // ranks.world_size)
         self.rewbuffer, self.lenbuffer = deque(maxlen=kept), deque(maxlen=kept)
         self._measure = measure
+        self._on_begin = on_begin
         self._on_iteration = on_iteration
         self._ranks = ranks
 
@@ -166,6 +169,7 @@ class TrainingLogger(Logger):
         if self._ranks.several and self.log_dir is not None:
             curves = self.writer if isinstance(self.writer, CurveWriter) else None
             self.writer = MeanCurves(self._ranks, curves)
+        self._on_begin()
 
     def log(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401
         """Log an iteration, see `Logger.log`; show it on the display instead of the console."""

@@ -7,17 +7,17 @@ import itertools
 import shlex
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from mute.checkpoint import newest_checkpoint
+from mute.checkpoint import first_line, newest_checkpoint
 from mute.config import TaskCfg, to_plain
 from mute.learning.distributed import Ranks
 from mute.support.errors import MuteError
-from mute.support.files import write_file
+from mute.support.files import told_of_file, write_file
 from mute.support.provenance import current_commit, machine_kind
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     "last_saved",
     "plan_run",
     "program_name",
+    "read_parameters",
     "resume_hint",
     "started_command",
     "write_parameters",
@@ -105,27 +106,74 @@ def _is_taken(run_dir: Path) -> MuteError:
 
 
 def write_parameters(
-    run_dir: Path, task: str, cfg: TaskCfg, command: Sequence[str], resumed: bool
+    run_dir: Path,
+    task: str,
+    cfg: TaskCfg,
+    command: Sequence[str],
+    before: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write what the run is re-made from, before it starts or goes on.
+    """Write what the run is re-made from, as it starts or goes on.
 
     The command that started it stays; those that went on are listed under `resumed`.
+
+    Args:
+        run_dir: Directory of the run.
+        task: Name of the task.
+        cfg: Its configuration.
+        command: Words of the command that was given.
+        before: What `read_parameters` returned, where the run goes on.
 
     Raises:
         DiskError: If the file cannot be written.
     """
-    path = run_dir / _PARAMETERS
     origin: dict[str, Any] = {
         "command": shlex.join(command),
         "commit": current_commit(),
         "machine": machine_kind(),
     }
-    if resumed and path.exists():
-        before = yaml.safe_load(path.read_text())
+    if before is not None:
         entries = [*before.get("resumed", []), origin]
         origin = {name: before.get(name) for name in origin} | {"resumed": entries}
     content = {"task": task, **origin, **to_plain(cfg)}
-    write_file(path, yaml.safe_dump(content, sort_keys=False).encode())
+    write_file(run_dir / _PARAMETERS, yaml.safe_dump(content, sort_keys=False).encode())
+
+
+def read_parameters(run_dir: Path) -> dict[str, Any] | None:
+    """Return what a run was started with, as plain data; None where nothing tells of it.
+
+    What tells which commands made the run has the form that `write_parameters` gives it.
+
+    Raises:
+        MuteError: If the file cannot be read, or is damaged.
+    """
+    path = run_dir / _PARAMETERS
+    if not path.exists():
+        return None
+    try:
+        with told_of_file(path, "read"):
+            content = yaml.safe_load(path.read_bytes())
+        _check_parameters(content)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise MuteError(
+            f"{path} is damaged: {first_line(error)}; mend it, or move it away to go on without "
+            "the commands that it tells of"
+        ) from error
+    return content
+
+
+def _check_parameters(content: object) -> None:
+    """Raise ValueError unless it is in words what began a run, and each time that it went on."""
+    if not isinstance(content, dict):
+        raise ValueError("it holds no fields")
+    resumed = content.get("resumed", [])
+    if not isinstance(resumed, list):
+        raise ValueError("resumed must be a list")
+    for index, origin in enumerate([content, *resumed]):
+        place = f"resumed[{index - 1}]" if index else "it"
+        for name in ("command", "commit", "machine"):
+            told = origin.get(name) if isinstance(origin, dict) else origin
+            if not isinstance(told, str | None):  # earlier versions told less
+                raise ValueError(f"{place} must tell its {name} in words")
 
 
 def started_command(ranks: Ranks, program: str) -> list[str]:

@@ -117,6 +117,7 @@ class MuteRunner(OnPolicyRunner):
             num_envs=estimated.num_envs,
             device=device,
             measure=self._measure_noise,
+            on_begin=self._begin,
             on_iteration=self._end_iteration,
             ranks=self.ranks,
         )
@@ -124,6 +125,8 @@ class MuteRunner(OnPolicyRunner):
         self._levels: dict[str, float] = {}
         self.robots_anew = True
         """Whether robots begin their first episodes, as they do unless `load` finds them saved."""
+        self.on_begin: Callable[[], None] | None = None
+        """Called when all is ready and the first iteration is about to begin."""
         self._on_iteration = on_iteration
         # With several ranks a second Ctrl-C says no more: torchrun passes on what a rank may have
         # had already, and ends by force what does not end by itself. It also signals the ranks
@@ -141,7 +144,9 @@ class MuteRunner(OnPolicyRunner):
         Raises:
             CheckpointError: If a checkpoint cannot be written.
             DiskError: If curves cannot be written.
+            DivergedError: If something is no longer finite; nothing of that iteration is kept.
         """
+        first, updates = self.current_learning_iteration, self.alg.updates
         left = self.task_cfg.agent.iterations - self.current_learning_iteration
         with self.stop, quiet_writer_thread():
             try:
@@ -152,6 +157,10 @@ class MuteRunner(OnPolicyRunner):
                     self.save(str(self.checkpoint_path()))
                 self.logger.stop_logging_writer()  # writes out the last curves
                 return False
+            except DivergedError as error:
+                self.logger.stop_logging_writer()
+                iteration = first + self.alg.updates - updates
+                raise DivergedError(f"iteration {iteration}: {error}") from error
         return True
 
     def checkpoint_path(self) -> Path:
@@ -173,7 +182,7 @@ class MuteRunner(OnPolicyRunner):
         """
         broken = self.alg.weights_not_finite()
         if broken is not None:
-            raise DivergedError(f"{broken} not finite, so {path} is not written")
+            raise DivergedError(f"{path} is not written: NaN or infinity in {broken}")
         with self.stop.finishing():
             self._save(Path(path), infos)
 
@@ -245,8 +254,9 @@ class MuteRunner(OnPolicyRunner):
         """Go on with the configured learning rates, but where the schedule has led PPO's on."""
         agent = self.task_cfg.agent
         asked = agent.ppo.learning_rate
-        goes_on = agent.ppo.schedule == "adaptive" and asked == saved.ppo.learning_rate
-        self.alg.set_learning_rates(None if goes_on else asked, agent.estimation.learning_rate)
+        if agent.ppo.schedule == "fixed" or asked != saved.ppo.learning_rate:
+            self.alg.learn_at(asked)
+        self.alg.trainer.optimizer.set_learning_rate(agent.estimation.learning_rate)
 
     @property
     def _on_cuda(self) -> bool:
@@ -268,6 +278,10 @@ class MuteRunner(OnPolicyRunner):
     def _about(self, iteration: int) -> dict[str, Any]:
         """Return what a checkpoint says of its policy."""
         return {"task": self.task, "config": to_plain(self.task_cfg), "iter": iteration}
+
+    def _begin(self) -> None:
+        if self.on_begin is not None:
+            self.on_begin()
 
     def _end_iteration(self, iteration: int, total: int, scalars: dict[str, float]) -> None:
         if self._on_iteration is not None:

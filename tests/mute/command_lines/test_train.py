@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -23,8 +25,9 @@ from mute.command_lines.train import main
 from mute.config import from_plain, to_plain
 from mute.envs.menagerie import SceneError
 from mute.envs.rewards import reward_term
-from mute.learning.runner import policy_part
+from mute.learning.runner import MuteRunner, policy_part
 from mute.support.errors import run_cli
+from mute.support.files import DiskError
 from mute.tasks import make_task
 
 
@@ -83,7 +86,7 @@ def test_plain_output_is_one_line_an_iteration(finished):
 
 def test_it_leaves_parameters_curves_and_checkpoints(finished):
     run, _ = finished
-    names = {path.name for path in run.iterdir()}
+    names = {path.name for path in run.glob("*.*")}
     assert {"config.yaml", "curves.jsonl", "model_0.pt", "model_2.pt"} <= names
     assert "model_1.pt" not in names
     assert sum(name.startswith("events.out.tfevents") for name in names) == 1
@@ -241,6 +244,124 @@ def test_an_option_that_a_resumed_run_cannot_heed_is_refused(arguments, words, f
     assert all(word in error for word in words), error
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--agent.activation", "relu", "agent.activation: a resumed run keeps 'elu', got 'relu'"),
+        ("--agent.init-std", "0.5", "agent.init_std: a resumed run keeps 0.8, got 0.5"),
+        ("--env.height-map.scale", "0.2", "env.height_map.scale: a resumed run keeps 0.1, got"),
+        ("--env.scene.timestep", "0.004", "env.scene.timestep: a resumed run keeps 0.005, got"),
+        ("--env.footfall.landing-window", "0.06", "env.footfall.landing_window: a resumed run"),
+        ("--num-envs", "16", "env.num_envs: a resumed run keeps 32, got 16"),
+        ("--env.randomization.friction", "0.3 0.9", "env.randomization.friction: a resumed run"),
+    ],
+)
+def test_a_field_that_a_resumed_run_cannot_change_is_named_and_nothing_is_written(
+    option, value, words, finished, capsys
+):
+    run, _ = finished
+    before = {path: path.read_bytes() for path in run.glob("*.*")}
+    arguments = ["--resume", str(run / "model_2.pt"), "--iterations", "9", option, *value.split()]
+    with pytest.raises(SystemExit) as stop:
+        run_cli(lambda: main(["--plain", *arguments]))
+    assert stop.value.code == 2
+    error = capsys.readouterr().err
+    assert _is_one_line(error)
+    assert "does not fit this configuration" in error
+    assert words in error
+    assert {path: path.read_bytes() for path in run.glob("*.*")} == before
+
+
+def _resumable(finished, directory: Path) -> Path:
+    """Copy a finished run, and return its last checkpoint."""
+    shutil.copytree(finished[0], directory)
+    return directory / "model_2.pt"
+
+
+@pytest.mark.parametrize(
+    ("options", "rate"),
+    [([], None), (["1e-6"], 1e-6), (["1e-3"], 1e-3)],
+    ids=["not given", "another", "the one of the start"],
+)
+def test_a_learning_rate_that_is_given_is_the_one_that_is_learnt_at(
+    options, rate, finished, tmp_path, monkeypatch
+):
+    path = _resumable(finished, tmp_path / "run")
+    content = load_checkpoint(path)
+    content["optimizer_state_dict"]["param_groups"][0]["lr"] = 3e-4
+    save_checkpoint(path, content)
+    seen = []
+    monkeypatch.setattr(
+        MuteRunner, "train", lambda runner: seen.append(runner.alg.optimizer.param_groups[0]["lr"])
+    )
+    given = ["--agent.ppo.learning-rate", *options] if options else []
+    main(["--plain", "--resume", str(path), "--iterations", "4", *given])
+    assert seen == [rate or 3e-4]
+
+
+def test_the_written_parameters_are_those_that_the_resumed_run_learns_with(finished, tmp_path):
+    path = _resumable(finished, tmp_path / "run")
+    options = ["--agent.ppo.learning-rate", "1e-6", "--agent.estimation.learning-rate=2e-6"]
+    options += ["--agent.ppo.schedule", "fixed", "--env.episode-length", "9.0"]
+    assert main(["--plain", "--resume", str(path), "--iterations", "4", *options]) == 0
+    written = yaml.safe_load(path.with_name("config.yaml").read_text())
+    assert written["agent"]["ppo"]["learning_rate"] == 1e-6
+    assert written["env"]["episode_length"] == 9.0
+    assert "--agent.ppo.learning-rate 1e-6" in written["resumed"][0]["command"]
+    saved = load_checkpoint(path.with_name("model_3.pt"))
+    assert saved["optimizer_state_dict"]["param_groups"][0]["lr"] == 1e-6
+    assert saved["estimator_trainer"]["optimizer"]["param_groups"][0]["lr"] == 2e-6
+    assert [line["Loss/learning_rate"] for line in _curves(path.parent)][3] == 1e-6
+
+
+def test_parameters_are_written_when_the_run_has_begun_and_not_before(
+    finished, tmp_path, monkeypatch, capsys
+):
+    path = _resumable(finished, tmp_path / "run")
+    before = path.with_name("config.yaml").read_bytes()
+
+    def refuse(*args: object, **kwargs: object) -> None:
+        raise DiskError("cannot write in run: No space left on device")
+
+    monkeypatch.setattr("mute.learning.logger.CurveWriter.__init__", refuse)
+    with pytest.raises(SystemExit) as stop:
+        run_cli(lambda: main(["--plain", "--resume", str(path), "--iterations", "4"]))
+    assert stop.value.code == 2
+    assert "No space left on device; the last checkpoint is whole" in capsys.readouterr().err
+    assert path.with_name("config.yaml").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"task: [go1", "while parsing a flow sequence"),
+        (b"\xff\xfe\x00x", ""),
+        (b"- 1\n- 2\n", "it holds no fields"),
+        (b"", "it holds no fields"),
+        (b"command: {a: 1}\n", "it must tell its command in words"),
+        (b"resumed: 3\n", "resumed must be a list"),
+        (b"resumed: [3]\n", "resumed[0] must tell its command in words"),
+    ],
+    ids=["cut short", "no text", "list", "empty", "command", "resumed", "entry"],
+)
+def test_damaged_parameters_are_blamed_in_one_line_and_nothing_is_lost(
+    content, words, finished, tmp_path, capsys
+):
+    path = _resumable(finished, tmp_path / "run")
+    parameters = path.with_name("config.yaml")
+    parameters.write_bytes(content)
+    before = {item: item.read_bytes() for item in path.parent.glob("*.*")}
+    with pytest.raises(SystemExit) as stop:
+        run_cli(lambda: main(["--plain", "--resume", str(path), "--iterations", "4"]))
+    assert stop.value.code == 2
+    error = capsys.readouterr().err
+    assert _is_one_line(error), error
+    assert f"{parameters} is damaged: " in error
+    assert words in error
+    assert "move it away" in error
+    assert {item: item.read_bytes() for item in path.parent.glob("*.*")} == before
+
+
 def test_options_of_earlier_versions_are_still_understood():
     options = ["--agent.estimation.network.height-scale", "0.2", "--env.height-map.offset=0.28"]
     options += ["--env.rewards.landing-speed", "-3.5", "--env.rewards.tilt=-5.0"]
@@ -319,6 +440,37 @@ def test_a_checkpoint_that_later_ones_follow_is_not_resumed(finished, capsys):
     assert {path: path.read_bytes() for path in run.glob("*.*")} == before
 
 
+# -- numbers that are none any more ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        ("--agent.ppo.learning-rate", "--agent.ppo.learning-rate may help"),
+        ("--agent.estimation.learning-rate", "--agent.estimation.learning-rate may help"),
+    ],
+)
+def test_a_training_that_diverges_stops_says_so_and_keeps_the_last_good_checkpoint(
+    option, words, finished, tmp_path, capsys
+):
+    path = _resumable(finished, tmp_path / "run")
+    whole = path.read_bytes()
+    rate = [option, "1e30", "--agent.ppo.schedule", "fixed", "--agent.save-interval", "1"]
+    with pytest.raises(SystemExit) as stop:
+        run_cli(lambda: main(["--plain", "--resume", str(path), "--iterations", "9", *rate]))
+    assert stop.value.code == 2
+    *told, error = capsys.readouterr().err.splitlines()
+    assert len(told) == 1  # the run's directory
+    assert error.startswith("error: iteration 3: NaN or infinity in the ")
+    assert "stops and keeps nothing of this iteration" in error
+    assert words in error
+    assert "the last checkpoint is whole, go on with: " in error
+    assert error.endswith(f"--resume {path}")
+    assert path.read_bytes() == whole
+    assert not path.with_name("model_3.pt").exists()
+    assert [line["iteration"] for line in _curves(path.parent)] == [0, 1, 2]
+
+
 # -- bad input -----------------------------------------------------------------------------------
 
 
@@ -375,6 +527,10 @@ def test_bad_input_is_refused_in_one_line_before_anything_is_written(
     assert not (tmp_path / "runs").exists()
 
 
+def _without(saved: dict[str, Any], name: str) -> dict[str, Any]:
+    return {key: value for key, value in saved.items() if key != name}
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
@@ -384,8 +540,21 @@ def test_bad_input_is_refused_in_one_line_before_anything_is_written(
         (lambda path, saved: save_checkpoint(path, saved | {"task": "go9"}), "go9"),
         (lambda path, saved: save_checkpoint(path, saved | {"config": 3}), "configuration"),
         (lambda path, saved: save_checkpoint(path, saved | {"env": {}}), "does not fit"),
+        (lambda path, saved: save_checkpoint(path, _without(saved, "iter")), "iter is missing"),
+        (lambda path, saved: save_checkpoint(path, saved | {"iter": "2"}), "iter must be int"),
+        (lambda path, saved: save_checkpoint(path, _without(saved, "infos")), "infos is missing"),
     ],
-    ids=["text", "foreign", "policy only", "other task", "bad config", "no world"],
+    ids=[
+        "text",
+        "foreign",
+        "policy only",
+        "other task",
+        "bad config",
+        "no world",
+        "no iteration",
+        "word for an iteration",
+        "no infos",
+    ],
 )
 def test_a_checkpoint_that_cannot_be_resumed_is_refused_in_one_line(
     make, words, finished, tmp_path, capsys

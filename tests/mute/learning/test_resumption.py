@@ -116,7 +116,7 @@ def test_all_that_can_be_applied_is_applied_at_once_and_the_run_goes_on(saved, t
     asked = _changed(make_cfg(iterations=1), paths)
     old, new = flat_fields(make_cfg(iterations=1)), flat_fields(asked)
     unchanged = [path for path in paths if old[path] == new[path]]
-    assert len(unchanged) < 0.1 * len(paths), unchanged
+    assert {path.rpartition(".")[2] for path in unchanged} <= {"function", "group"}
     runner = MuteRunner("go1_mute", asked, tmp_path)
     runner.load(str(saved))
     assert runner.env.cfg == asked.env
