@@ -279,6 +279,40 @@ def test_ranks_that_were_given_different_commands_end_with_one_line(tmp_path):
     assert not (tmp_path / "runs").exists()
 
 
+SPOILT_ON_RANK_1 = """
+import os, sys
+from mute.command_lines.train import main
+from mute.learning.estimator_trainer import EstimatorTrainer
+from mute.support.errors import run_cli
+
+update = EstimatorTrainer.update
+
+def spoilt(trainer, *args):
+    losses = update(trainer, *args)
+    if losses and os.environ["RANK"] == "1":
+        losses["estimator_total"] = float("nan")
+    return losses
+
+EstimatorTrainer.update = spoilt
+run_cli(lambda: main(sys.argv[1:]))
+"""
+
+
+def test_all_ranks_stop_where_the_loss_of_one_is_no_number_and_the_first_says_so(tmp_path):
+    options = ["--iterations", "9", "--log-dir", str(tmp_path), "--run-name", "r"]
+    command = ["-c", SPOILT_ON_RANK_1, *TINY, *options, "--agent.save-interval", "1"]
+    processes = _start_ranks(command, command)
+    errors = _finish(processes)
+    assert [process.returncode for process in processes] == [2, 2], errors
+    error = errors[0].splitlines()[-1]
+    assert error.startswith("error: iteration 1: NaN or infinity in the loss 'estimator_total'")
+    run = tmp_path / "go1_mute" / "r"
+    assert error.endswith(f"--resume {run / 'model_0.pt'}")
+    assert errors[1] == ""
+    assert [path.name for path in run.glob("model_*")] == ["model_0.pt"]
+    assert _iterations(run) == [0]
+
+
 # -- alone, or nearly ------------------------------------------------------------------------------
 
 
