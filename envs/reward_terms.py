@@ -16,6 +16,8 @@ from typing import Literal, get_args
 
 import torch
 
+from mute.support.ranges import Range, check_number
+
 from .motion import Motion
 
 __all__ = ["REWARD_FUNCTIONS", "Group", "Parameter", "RewardFunction", "register_term"]
@@ -26,6 +28,10 @@ Group = Literal["task", "phase", "other", "lift", "guide"]
 Function = Callable[..., torch.Tensor]
 
 
+_FINITE = Range(-math.inf, above=True)
+_POSITIVE = Range(0.0, above=True)
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A number that a reward function takes beside the motion."""
@@ -34,25 +40,8 @@ class Parameter:
     """Its value unless a task says otherwise."""
     text: str
     """What it is, with its unit."""
-    above: float = -math.inf
-    """It must be larger than this."""
-    at_least: float = -math.inf
-    """It must not be smaller than this."""
-    at_most: float = math.inf
-    """It must not be larger than this."""
-
-    def check(self, name: str, value: float) -> None:
-        """Refuse a value that is not finite or out of its range.
-
-        Raises:
-            ValueError: With the name, the value and what is allowed.
-        """
-        if not math.isfinite(value):
-            raise ValueError(f"{name} must be finite, got {value}")
-        if not (self.above < value and self.at_least <= value <= self.at_most):
-            bounds = ((">", self.above), (">=", self.at_least), ("<=", self.at_most))
-            allowed = " and ".join(f"{sign} {x:g}" for sign, x in bounds if math.isfinite(x))
-            raise ValueError(f"{name} must be {allowed}, got {value}")
+    allowed: Range = _FINITE
+    """What it may be; every finite number by default."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +99,7 @@ def register_term(
                 f"{name} takes {taken} beside the motion, and is registered with {list(parameters)}"
             )
         for parameter_name, parameter in parameters.items():
-            parameter.check(f"{name}.{parameter_name}", parameter.default)
+            check_number(f"{name}.{parameter_name}", parameter.default, parameter.allowed)
         _functions[name] = RewardFunction(function, group, MappingProxyType(parameters))
         return function
 
@@ -120,14 +109,14 @@ def register_term(
 _SHARPNESS = "inverse of the squared error at which 1/e of it is left"
 
 
-@register_term("task", sharpness=Parameter(4.0, f"{_SHARPNESS}, s^2/m^2", above=0.0))
+@register_term("task", sharpness=Parameter(4.0, f"{_SHARPNESS}, s^2/m^2", _POSITIVE))
 def lin_vel_tracking(motion: Motion, sharpness: float) -> torch.Tensor:
     """Reward the commanded horizontal velocity: exp(-sharpness |v_xy^cmd - v_xy|^2)."""
     error = (motion.command[:, :2] - motion.base_lin_vel[:, :2]).square().sum(dim=1)
     return torch.exp(-sharpness * error)
 
 
-@register_term("task", sharpness=Parameter(4.0, f"{_SHARPNESS}, s^2/rad^2", above=0.0))
+@register_term("task", sharpness=Parameter(4.0, f"{_SHARPNESS}, s^2/rad^2", _POSITIVE))
 def ang_vel_tracking(motion: Motion, sharpness: float) -> torch.Tensor:
     """Reward the commanded yaw rate: exp(-sharpness (w_z^cmd - w_z)^2)."""
     return torch.exp(-sharpness * (motion.command[:, 2] - motion.base_ang_vel[:, 2]).square())
@@ -151,7 +140,7 @@ def foot_raise_velocity(motion: Motion) -> torch.Tensor:
     return ((-motion.phase).exp() * motion.foot_raise_sq).sum(dim=1)
 
 
-@register_term("phase", depth=Parameter(0.02, "height at which 1/e of it is left, m", above=0.0))
+@register_term("phase", depth=Parameter(0.02, "height at which 1/e of it is left, m", _POSITIVE))
 def near_ground_drop(motion: Motion, depth: float) -> torch.Tensor:
     """Penalise feet that move down close to the ground, whatever the phase; not in the paper.
 
@@ -205,7 +194,7 @@ def collision(motion: Motion) -> torch.Tensor:
     return motion.collisions
 
 
-@register_term(desired=Parameter(0.30, "height of the trunk above the ground, m", above=0.0))
+@register_term(desired=Parameter(0.30, "height of the trunk above the ground, m", _POSITIVE))
 def base_height(motion: Motion, desired: float) -> torch.Tensor:
     """Penalise a trunk off its desired height: (desired - height)^2."""
     return (desired - motion.base_height).square()
@@ -232,7 +221,7 @@ def power_distribution(motion: Motion) -> torch.Tensor:
     return (power - power.mean(dim=1, keepdim=True)).square().mean(dim=1)
 
 
-@register_term("lift", target=Parameter(0.06, "clearance of a foot in swing, m", above=0.0))
+@register_term("lift", target=Parameter(0.06, "clearance of a foot in swing, m", _POSITIVE))
 def foot_clearance(motion: Motion, target: float) -> torch.Tensor:
     """Penalise feet that travel off their target clearance; DreamWaQ's.
 
@@ -242,7 +231,7 @@ def foot_clearance(motion: Motion, target: float) -> torch.Tensor:
     return (error * motion.foot_speed_xy).sum(dim=1)
 
 
-@register_term("lift", target=Parameter(0.04, "apex that a swing should reach, m", above=0.0))
+@register_term("lift", target=Parameter(0.04, "apex that a swing should reach, m", _POSITIVE))
 def touchdown_apex(motion: Motion, target: float) -> torch.Tensor:
     """Penalise, at landing, a swing that stayed below its target.
 

@@ -13,6 +13,8 @@ from typing import Literal, get_args
 
 import torch
 
+from mute.support.ranges import check_number
+
 from .motion import Motion
 from .reward_terms import REWARD_FUNCTIONS, Group
 
@@ -96,25 +98,25 @@ class RewardsCfg:
         """
         if self.phase_source not in ("estimated", "true"):
             raise ValueError(
-                f"rewards.phase_source must be 'estimated' or 'true', got {self.phase_source!r}"
+                f"env.rewards.phase_source must be 'estimated' or 'true', got {self.phase_source!r}"
             )
         if not 0.0 <= self.k <= 1.0:
-            raise ValueError(f"rewards.k must be in [0, 1], got {self.k}")
+            raise ValueError(f"env.rewards.k must be in [0, 1], got {self.k}")
         for name in ("quiet_ramp", "lift_ramp", "guide_ramp"):
             start, end = getattr(self, name)
             if not 0.0 <= start <= end < math.inf:
                 raise ValueError(
-                    f"rewards.{name} must be (start, end) with 0 <= start <= end, both finite, "
+                    f"env.rewards.{name} must be (start, end) with 0 <= start <= end, both finite, "
                     f"got {(start, end)}"
                 )
         for name, term in self.terms.items():
             if not name.isidentifier():
-                raise ValueError(f"rewards.terms must have names as Python has, got {name!r}")
-            _complete(f"rewards.terms.{name}", term)
+                raise ValueError(f"env.rewards.terms must have names as Python has, got {name!r}")
+            _complete(f"env.rewards.terms.{name}", term)
             if term.group == "guide" and term.weight != 0.0 and self.guide_ramp[1] == 0.0:
                 raise ValueError(
-                    f"rewards.guide_ramp must end after 0 s where rewards.terms.{name}.weight is "
-                    f"{term.weight}, got {self.guide_ramp}"
+                    "env.rewards.guide_ramp must end after 0 s where "
+                    f"env.rewards.terms.{name}.weight is {term.weight}, got {self.guide_ramp}"
                 )
 
 
@@ -136,7 +138,7 @@ def _complete(place: str, term: RewardTermCfg) -> None:
         name: term.params.get(name, parameter.default) for name, parameter in parameters.items()
     }
     for name, parameter in parameters.items():
-        parameter.check(f"{place}.params.{name}", term.params[name])
+        check_number(f"{place}.params.{name}", term.params[name], parameter.allowed)
 
 
 def _unknown(place: str, function: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg
@@ -11,7 +12,7 @@ from mute.envs.randomization import RandomizationCfg
 from mute.envs.rewards import RewardsCfg, paper_terms, reward_term
 from mute.support.errors import MuteError
 
-__all__ = ["DEFAULT_TASK", "make_task", "task_names"]
+__all__ = ["DEFAULT_TASK", "make_task", "register_task", "task_names"]
 
 DEFAULT_TASK = "go1_mute"
 
@@ -82,6 +83,25 @@ _TASKS: dict[str, Callable[[], TaskCfg]] = {
 def task_names() -> list[str]:
     """Return the names of all tasks."""
     return list(_TASKS)
+
+
+def register_task(name: str, factory: Callable[[], TaskCfg]) -> None:
+    """Make a task known by its name, under which it is learnt and its runs are kept.
+
+    Args:
+        name: Letters, digits, `_`, `-` and `.`, a letter first.
+        factory: Returns a new configuration at each call.
+
+    Raises:
+        MuteError: If there is such a task already, or the name is another.
+    """
+    if name in _TASKS:
+        raise MuteError(f"the task {name!r} is registered already; give it another name")
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_.-]*", name):
+        raise MuteError(
+            f"a task's name must be letters, digits, '_', '-' and '.', a letter first, got {name!r}"
+        )
+    _TASKS[name] = factory
 
 
 def make_task(name: str) -> TaskCfg:

@@ -27,11 +27,21 @@ into a model is that of the environments.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import log, pi
+from math import inf, log, pi
+from types import MappingProxyType
 
-__all__ = ["FLOORS", "FOOT_STIFFNESS", "Floor", "Mode", "find_floors"]
+__all__ = [
+    "FLOORS",
+    "FOOT_STIFFNESS",
+    "OWN_GAINS",
+    "Floor",
+    "Mode",
+    "find_floors",
+    "register_floor",
+]
 
 FOOT_STIFFNESS = 6e4
 """Linear stiffness of the rubber foot, N/m (see above: Hertz, linearised)."""
@@ -94,7 +104,7 @@ def _modes(loss_factor: float, scale: float, *modes: tuple[float, float]) -> tup
     )
 
 
-FLOORS: dict[str, Floor] = {
+_floors: dict[str, Floor] = {
     floor.name: floor
     for floor in (
         Floor(
@@ -182,7 +192,70 @@ FLOORS: dict[str, Floor] = {
         ),
     )
 }
+_own_gains: dict[str, float | str] = {}
+
+FLOORS: Mapping[str, Floor] = MappingProxyType(_floors)
 """The floors by name."""
+
+OWN_GAINS: Mapping[str, float | str] = MappingProxyType(_own_gains)
+"""For each floor that was registered its gain, or the floor whose gain it has.
+
+The others have theirs from the calibration."""
+
+
+def register_floor(floor: Floor, gain: float | str) -> None:
+    """Make a floor known by its name.
+
+    Args:
+        floor: The floor.
+        gain: What its sound is multiplied by, as no calibration knows it; or the name of a floor
+            that it has the gain of.
+
+    Raises:
+        ValueError: If there is such a floor already, or a figure is out of its range.
+    """
+    if floor.name in FLOORS:
+        raise ValueError(f"the floor {floor.name!r} is registered already; give it another name")
+    _check(floor)
+    if isinstance(gain, str):
+        find_floors([gain])
+        gain = OWN_GAINS.get(gain, gain)
+    elif not 0.0 < gain < inf:
+        raise ValueError(f"floor {floor.name}: gain must be > 0 and finite, got {gain}")
+    _floors[floor.name] = floor
+    _own_gains[floor.name] = gain
+
+
+def _check(floor: Floor) -> None:
+    """Refuse a floor that cannot be."""
+    if not re.fullmatch(r"[a-z][a-z0-9_-]*", floor.name):
+        raise ValueError(
+            "a floor's name must be small letters, digits, '_' and '-', a letter first, "
+            f"got {floor.name!r}"
+        )
+    if not floor.modes:
+        raise ValueError(f"floor {floor.name}: modes must hold at least one")
+    low, high = floor.scuff_band
+    figures = {
+        "friction": floor.friction,
+        "solref": min(floor.solref),
+        "stiffness": floor.stiffness,
+        "scuff_efficiency": floor.scuff_efficiency,
+        "scuff_band": low,
+    }
+    for number, mode in enumerate(floor.modes):
+        figures |= {f"modes[{number}].{name}": value for name, value in vars(mode).items()}
+    for name, value in figures.items():
+        if not 0.0 < value < inf:
+            raise ValueError(f"floor {floor.name}: {name} must be > 0 and finite, got {value}")
+    if not low < high < inf:
+        raise ValueError(f"floor {floor.name}: scuff_band must rise, got {floor.scuff_band}")
+    if not 0.0 <= floor.restitution < 1.0:
+        raise ValueError(
+            f"floor {floor.name}: restitution must be in [0, 1), got {floor.restitution}"
+        )
+    if not all(0.0 <= part <= 1.0 for part in floor.colour):
+        raise ValueError(f"floor {floor.name}: colour must be of 0 to 1, got {floor.colour}")
 
 
 def find_floors(names: Iterable[str]) -> tuple[Floor, ...]:

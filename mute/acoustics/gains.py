@@ -10,7 +10,7 @@ import json
 import sys
 from pathlib import Path
 
-from mute.acoustics.floors import FLOORS
+from mute.acoustics.floors import FLOORS, OWN_GAINS
 from mute.support.errors import MuteError
 from mute.support.resources import RESOURCES
 
@@ -21,14 +21,14 @@ GAINS_FILE = RESOURCES / "acoustics" / "calibration.json"
 
 
 def load_gains(path: Path = GAINS_FILE) -> dict[str, float]:
-    """Return the gain of each floor.
+    """Return the gain of each floor: the calibration's, or its own of one that was registered.
 
     Raises:
         MuteError: If the file is missing, broken, or lacks a floor.
     """
     try:
         floors = json.loads(path.read_text())["floors"]
-        gains = {name: floors[name]["gain"] for name in FLOORS}
+        gains = {name: floors[name]["gain"] for name in FLOORS if name not in OWN_GAINS}
     except OSError as error:
         raise MuteError(f"cannot read the calibration {path}: {error.strerror}") from error
     except KeyError as error:
@@ -40,4 +40,6 @@ def load_gains(path: Path = GAINS_FILE) -> dict[str, float]:
         if not number or not 0.0 < gain <= sys.float_info.max:
             shown = repr(gain) if len(repr(gain)) < 40 else f"{repr(gain)[:37]}..."
             raise MuteError(f"{path}: the gain of {name} must be a number > 0, got {shown}")
-    return {name: float(gain) for name, gain in gains.items()}
+    gains = {name: float(gain) for name, gain in gains.items()}
+    own = {name: gains[g] if isinstance(g, str) else g for name, g in OWN_GAINS.items()}
+    return gains | own

@@ -13,6 +13,7 @@ import tyro
 from mute.command_lines.parser_errors import in_one_line
 from mute.config_versions import MOVED
 from mute.support.errors import MuteError
+from mute.support.plugins import load_plugin
 from mute.support.ranges import Range
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "parse",
     "resolve_device",
     "selected_task",
+    "task_name",
 ]
 
 
@@ -133,6 +135,20 @@ def selected_task(argv: Sequence[str], default: str) -> str:
         lambda: tyro.cli(only_task, args=without_help, return_unknown_args=True, add_help=False)
     )
     return task
+
+
+def task_name(asked: str) -> str:
+    """Return the name of a task that a user asked for.
+
+    Of `module:task`, the module is imported, which registers the task.
+
+    Raises:
+        MuteError: If the module cannot be imported.
+    """
+    module, colon, name = asked.rpartition(":")
+    if colon:
+        load_plugin(module, "--task")
+    return name
 
 
 def resolve_device(device: str) -> str:

@@ -40,6 +40,7 @@ from mute.evaluation.tables import print_table, write_json
 from mute.learning.runner import MuteRunner
 from mute.support.errors import MuteError
 from mute.support.memory import keep_freed_memory
+from mute.support.plugins import load_plugins
 from mute.support.processes import call_apart, peak_memory_mb
 from mute.support.provenance import machine_kind
 from mute.support.ranges import Range
@@ -202,6 +203,7 @@ def _rates_apart(task: str, num_envs: int, rollouts: int) -> dict[str, float]:
 def _measure_as_trained(task: str, num_envs: int, rollouts: int) -> Rates:
     """Return the rates in a process whose memory is kept as in that of a training."""
     keep_freed_memory()
+    load_plugins()
     return measure(task, num_envs, rollouts)
 
 

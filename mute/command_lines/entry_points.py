@@ -15,6 +15,7 @@ from typing import NoReturn
 from mute.rendering.backend import configure_rendering
 from mute.support.errors import run_cli
 from mute.support.memory import keep_freed_memory
+from mute.support.plugins import load_plugins
 from mute.support.streams import patient_output
 from mute.support.threads import configure_threads
 
@@ -91,6 +92,7 @@ def _start(command: str, renders: bool = False, keeps_files: bool = False) -> No
         _print_what_can_be()
         configure_threads()  # before torch is imported
         configure_rendering(sys.argv[1:] if renders else [])  # before mujoco is
+        load_plugins()
         with patient_output() if keeps_files else contextlib.nullcontext():
             return importlib.import_module(f"mute.command_lines.{command}").main()
 

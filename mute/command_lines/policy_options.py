@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Self
 
 from mute.checkpoint import CheckpointError, latest_checkpoint, load_checkpoint
+from mute.command_lines.arguments import task_name
 from mute.support.errors import MuteError
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK, make_task
@@ -27,9 +28,19 @@ class PolicyArgs:
     one that ships."""
     task: str | None = None
     """Task of the policy: of the one that ships, go1_mute unless given, or of the latest, any
-    unless given. A checkpoint that is named must be of it."""
+    unless given. A checkpoint that is named must be of it. `module:task` imports a module of yours
+    first, which registers it."""
     log_dir: Path = Path("runs")
     """Directory of the runs that 'latest' looks through."""
+
+    def __post_init__(self) -> None:
+        """Import the task's module at once: it may register a floor that is asked for, too.
+
+        Raises:
+            MuteError: If it cannot be imported.
+        """
+        if self.task is not None:
+            self.task = task_name(self.task)
 
     def with_policy_found(self) -> Self:
         """Return the same arguments, the policy as the file that is meant.

@@ -25,6 +25,7 @@ from mute.command_lines.arguments import (
     parse,
     resolve_device,
     selected_task,
+    task_name,
 )
 from mute.command_lines.reward_options import (
     TERM_OPTIONS,
@@ -66,7 +67,7 @@ class TrainArgs:
     """Arguments of `train.py`."""
 
     task: str = DEFAULT_TASK
-    """Task to learn."""
+    """Task to learn; `module:task` imports a module of yours first, which registers it."""
     num_envs: int | None = None
     """Number of robots, of each rank where torchrun starts several; by default what suits the
     machine."""
@@ -141,11 +142,12 @@ def _learn(argv: Sequence[str], ranks: Ranks, command: Sequence[str]) -> int:
             "curricula go on, robots begin anew",
         )
     _say(ranks, f"run: {run_dir}")
-    finished = _train(runner, ranks, display, lambda: last_saved(run_dir, command, args.task))
+    task = selected_task(argv, DEFAULT_TASK)  # with its module
+    finished = _train(runner, ranks, display, lambda: last_saved(run_dir, command, task))
     path = runner.checkpoint_path()
     _say(ranks, f"{'saved' if finished else 'interrupted, saved'}: {path}")
     if not finished:
-        _say(ranks, f"go on with: {resume_hint(command, args.task, path)}")
+        _say(ranks, f"go on with: {resume_hint(command, task, path)}")
         return runner.stop.exit_status
     return 0
 
@@ -213,7 +215,7 @@ def _resume(runner: MuteRunner, checkpoint: Path) -> None:
 
 def _arguments(argv: Sequence[str]) -> tuple[TrainArgs, Path | None]:
     """Parse the command line over the defaults of its task or of the checkpoint it resumes."""
-    task = selected_task(argv, DEFAULT_TASK)
+    task = task_name(selected_task(argv, DEFAULT_TASK))
     cfg = make_task(task)
     args = _parse(argv, task, cfg)
     if args.resume is None:
@@ -263,7 +265,7 @@ def _parse(argv: Sequence[str], task: str, cfg: TaskCfg) -> TrainArgs:
     default = TrainArgs(task=task, env=with_terms_offered(cfg.env), agent=cfg.agent)
     with TERM_OPTIONS:
         args = parse(TrainArgs, current_spelling(argv), "Learn a task.", default)
-    return dataclasses.replace(args, env=without_unused_terms(args.env, cfg.env))
+    return dataclasses.replace(args, task=task, env=without_unused_terms(args.env, cfg.env))
 
 
 def _configuration(args: TrainArgs) -> TaskCfg:

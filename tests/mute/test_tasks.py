@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from mute import tasks
+from mute.config import TaskCfg
 from mute.support.errors import MuteError
-from mute.tasks import DEFAULT_TASK, make_task, task_names
+from mute.tasks import DEFAULT_TASK, make_task, register_task, task_names
 
 TABLE_I = {
     "lin_vel_tracking": 1.0,
@@ -64,3 +66,33 @@ def test_an_unknown_task_is_refused_with_the_names_there_are():
     with pytest.raises(MuteError) as caught:
         make_task("go2")
     assert all(name in str(caught.value) for name in [*task_names(), "'go2'"])
+
+
+@pytest.fixture
+def _registry(monkeypatch):
+    """Let a test register what no other one sees."""
+    monkeypatch.setattr(tasks, "_TASKS", dict(tasks._TASKS))
+
+
+@pytest.mark.usefixtures("_registry")
+def test_a_registered_task_is_made_by_its_factory_at_each_call():
+    register_task("soft-walk.2", TaskCfg)
+    assert task_names()[-1] == "soft-walk.2"
+    one, other = make_task("soft-walk.2"), make_task("soft-walk.2")
+    assert one == other == TaskCfg()
+    assert one is not other
+
+
+@pytest.mark.usefixtures("_registry")
+def test_a_task_is_registered_but_once():
+    with pytest.raises(MuteError, match="'go1_mute' is registered already"):
+        register_task("go1_mute", TaskCfg)
+    assert make_task("go1_mute") != TaskCfg()
+
+
+@pytest.mark.parametrize("name", ["", "a:b", "../up", "a b", "2fast", "a/b", "--task"])
+@pytest.mark.usefixtures("_registry")
+def test_a_name_that_could_be_no_directory_or_option_is_refused(name):
+    with pytest.raises(MuteError, match="a task's name must be"):
+        register_task(name, TaskCfg)
+    assert name not in task_names()

@@ -1,10 +1,13 @@
 """What a floor is."""
 
+import dataclasses
 import math
 
 import pytest
 
-from mute.acoustics.floors import FLOORS, FOOT_STIFFNESS, find_floors
+from mute.acoustics import floors
+from mute.acoustics import gains as mute_gains
+from mute.acoustics.floors import FLOORS, FOOT_STIFFNESS, Mode, find_floors, register_floor
 from mute.acoustics.sources.impacts import contact_time
 
 
@@ -52,3 +55,57 @@ def test_carpet_is_dull_and_tile_bright():
     assert max(mode.frequency for mode in FLOORS["carpet"].modes) < 500.0
     assert max(mode.decay_time for mode in FLOORS["carpet"].modes) < 0.1
     assert max(mode.frequency for mode in FLOORS["tile"].modes) > 3000.0
+
+
+@pytest.fixture
+def _registry(monkeypatch):
+    """Let a test register what no other one sees."""
+    known, gains = dict(floors._floors), dict(floors._own_gains)
+    for module in (floors, mute_gains):
+        monkeypatch.setattr(module, "FLOORS", known)
+        monkeypatch.setattr(module, "OWN_GAINS", gains)
+    monkeypatch.setattr(floors, "_floors", known)
+    monkeypatch.setattr(floors, "_own_gains", gains)
+
+
+CORK = dataclasses.replace(FLOORS["carpet"], name="cork", stiffness=1e5)
+
+
+@pytest.mark.usefixtures("_registry")
+def test_a_registered_floor_is_found_and_has_the_gain_that_it_came_with():
+    shipped = mute_gains.load_gains()
+    register_floor(CORK, gain=1.5)
+    register_floor(dataclasses.replace(CORK, name="lino"), gain="tile")
+    register_floor(dataclasses.replace(CORK, name="lino-2"), gain="lino")
+    register_floor(dataclasses.replace(CORK, name="cork_2"), gain="cork")
+    assert find_floors(["cork"]) == (CORK,)
+    own = {"cork": 1.5, "cork_2": 1.5, "lino": shipped["tile"], "lino-2": shipped["tile"]}
+    assert mute_gains.load_gains() == shipped | own
+
+
+@pytest.mark.parametrize(
+    ("changed", "gain", "words"),
+    [
+        ({"name": "wood"}, 1.0, ["'wood'", "already"]),
+        ({"name": "Cork Oak"}, 1.0, ["'Cork Oak'", "small letters"]),
+        ({}, 0.0, ["cork", "gain", "> 0", "0.0"]),
+        ({}, math.nan, ["cork", "gain", "> 0", "nan"]),
+        ({}, "oak", ["'oak'", "wood"]),
+        ({"friction": 0.0}, 1.0, ["cork", "friction", "0.0"]),
+        ({"solref": (0.02, -1.0)}, 1.0, ["cork", "solref", "-1.0"]),
+        ({"stiffness": math.inf}, 1.0, ["cork", "stiffness", "inf"]),
+        ({"restitution": 1.0}, 1.0, ["cork", "restitution", "[0, 1)", "1.0"]),
+        ({"modes": ()}, 1.0, ["cork", "modes"]),
+        ({"modes": (Mode(100.0, 0.0, 1.0),)}, 1.0, ["cork", "modes[0].decay_time", "0.0"]),
+        ({"scuff_band": (500.0, 200.0)}, 1.0, ["cork", "scuff_band", "rise"]),
+        ({"scuff_efficiency": math.nan}, 1.0, ["cork", "scuff_efficiency", "nan"]),
+        ({"colour": (0.0, 0.0, 2.0)}, 1.0, ["cork", "colour", "2.0"]),
+    ],
+)
+@pytest.mark.usefixtures("_registry")
+def test_a_floor_that_cannot_be_is_refused_by_the_field(changed, gain, words):
+    before = dict(floors._floors)
+    with pytest.raises(ValueError) as caught:
+        register_floor(dataclasses.replace(CORK, **changed), gain)
+    assert all(word in str(caught.value) for word in words), str(caught.value)
+    assert floors._floors == before

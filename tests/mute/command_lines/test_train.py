@@ -479,6 +479,8 @@ def test_a_training_that_diverges_stops_says_so_and_keeps_the_last_good_checkpoi
     [
         (["--task", "go2"], ["--task", "'go2'", "go1_mute_paper"]),
         (["--task"], ["--task"]),
+        (["--task", "mute_nowhere:walk"], ["--task", "no module 'mute_nowhere'"]),
+        (["--task", "mute.tasks:walk"], ["--task", "'walk'", "go1_mute_paper"]),
         (["--num-envs", "-3"], ["num_envs", "-3"]),
         (["--num-envs", "0"], ["num_envs", "0"]),
         (["--num-envs", "many"], ["--num-envs", "many"]),
