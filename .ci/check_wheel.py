@@ -36,7 +36,7 @@ import networks
 import numpy as np
 import train
 
-import mute.envs.gym  # registers the robot
+import mute  # registers the robot
 from mute.networks import Estimator
 from mute.support.provenance import current_commit
 
@@ -48,7 +48,7 @@ observation, _ = robot.reset(seed=0)
 for _ in range(50):
     observation, *_ = robot.step(np.zeros(12, dtype=np.float32))
     assert observation.shape == (46,) and np.isfinite(observation).all()
-print("commit:", current_commit())
+print(f"MUTE {mute.__version__}, commit {current_commit()}")
 """
 
 
@@ -156,7 +156,7 @@ def use(python: Path, user: Path) -> None:
     options = ("--iterations", "1", "--num-envs", "16", "--plain", "--log-dir", "runs")
     run(user, programs / "mute-train", *options, "--agent.noise-interval", "0")
     told = output(user, python, "program.py")
-    assert told == "commit: unknown\n", told
+    assert told.endswith("commit unknown\n"), told
 
 
 def run(folder: Path, *command: str | Path) -> None:
