@@ -56,7 +56,7 @@ def _numbers(command: str) -> Iterator[tuple[str, type]]:
 
 
 def _cases() -> Iterator[tuple[str, str, str]]:
-    bad = {float: ("nan", "inf", "-inf"), int: ("nan", "inf", "-1", "9" * 40)}
+    bad = {float: ("nan", "inf", "-inf", "1e+300"), int: ("nan", "inf", "-1", "9" * 40)}
     for command in _COMMANDS:
         for option, kind in _numbers(command):
             for value in bad[kind]:
@@ -107,7 +107,8 @@ def test_every_command_is_walked():
     with_arguments = {
         path.stem
         for path in folder.glob("*.py")
-        if re.search(r"^class \w*Args\b", path.read_text(), re.MULTILINE)
+        if not path.stem.endswith("_options")  # what commands share, and so are walked with
+        and re.search(r"^class \w*Args\b", path.read_text(), re.MULTILINE)
     }
     assert with_arguments == {module for module, _ in _COMMANDS.values()}
 
