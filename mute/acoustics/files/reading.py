@@ -3,7 +3,7 @@
 Reads integer PCM of 8 to 32 bits, float of 32 and 64 bits, A-law and mu-law, of any number of
 channels, and scales all of them so that full scale is 1. What such a number is in Pa is not in the
 file. Whatever is broken is refused with one line that names the file and what is wrong with it, or
-read with a warning; what libsndfile needs for that is in `mending`.
+read with a warning. Headers are read by `layout`, samples by libsndfile.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 import soundfile
 from numpy.typing import NDArray
 
-from mute.acoustics.files.mending import BEGINNINGS, MendedFile, find_layout
+from mute.acoustics.files.layout import BEGINNINGS, SampleBytes, find_layout
 from mute.acoustics.files.opening import open_seekable
 from mute.support.errors import MuteError
 
@@ -65,23 +65,29 @@ class WavReader:
         with contextlib.ExitStack() as opened:
             file = opened.enter_context(open_seekable(path, BEGINNINGS))
             try:
-                self._layout = find_layout(file, path)
+                layout = find_layout(file, path)
             except OSError as error:
                 raise MuteError(f"{path}: cannot be read: {error.strerror}") from error
+            self._format = layout.format
             low, high = sample_rates
             if not low <= self.sample_rate <= high:
                 raise MuteError(
                     f"{path}: sample rate {self.sample_rate} Hz, must be {low} to {high} Hz"
                 )
-            self._view = MendedFile(file, self._layout)
-            try:
-                buffered = io.BufferedReader(self._view, _BYTES_AT_ONCE)
-                self._sound = opened.enter_context(soundfile.SoundFile(buffered))
-            except soundfile.LibsndfileError as error:
-                raise MuteError(f"{path}: broken WAV file: {error.error_string}") from error
+            self._bytes = SampleBytes(file, layout)
+            self._sound = opened.enter_context(
+                soundfile.SoundFile(
+                    io.BufferedReader(self._bytes, _BYTES_AT_ONCE),
+                    samplerate=self.sample_rate,
+                    channels=self.channels,
+                    subtype=self._format.subtype,
+                    endian="BIG" if self._format.big_endian else "LITTLE",
+                    format="RAW",
+                )
+            )
             self.frames = self._sound.frames
             """Samples a channel."""
-            self.warnings = list(self._layout.warnings)
+            self.warnings = list(layout.warnings)
             """What a user must know about the file, one line each."""
             self._shift = self._find_shift()
             self._closing = opened.pop_all()
@@ -93,17 +99,17 @@ class WavReader:
     @property
     def channels(self) -> int:
         """Number of channels."""
-        return self._layout.channels
+        return self._format.channels
 
     @property
     def sample_rate(self) -> int:
         """Samples a second."""
-        return self._layout.sample_rate
+        return self._format.sample_rate
 
     @property
     def is_float(self) -> bool:
         """Whether samples are floating-point numbers, which can go beyond full scale."""
-        return self._sound.subtype in ("FLOAT", "DOUBLE")
+        return self._format.subtype in ("FLOAT", "DOUBLE")
 
     def __enter__(self) -> Self:
         return self
@@ -148,8 +154,8 @@ class WavReader:
             wanted = min(length, self.frames - begin)
             self._sound.seek(begin)
             frames = self._sound.read(wanted, dtype=dtype, always_2d=True)
-            if self._view.error:
-                raise MuteError(f"{self.path}: cannot be read: {self._view.error.strerror}")
+            if self._bytes.error:
+                raise MuteError(f"{self.path}: cannot be read: {self._bytes.error.strerror}")
             if len(frames) < wanted:
                 raise MuteError(f"{self.path}: truncated while it was read")
             yield frames.T
@@ -165,10 +171,10 @@ class WavReader:
         Raises:
             MuteError: If the samples go with neither.
         """
-        spare = self._layout.spare_bits
+        spare = self._format.spare_bits
         if spare == 0:
             return 0
-        unused_below = (1 << spare) - 1 << 32 - 8 * self._layout.sample_bytes
+        unused_below = (1 << spare) - 1 << 32 - 8 * self._format.sample_bytes
         high = signed = unsigned = True
         for block in self._raw_blocks("int32"):
             high = high and not np.any(block & unused_below)
@@ -176,7 +182,7 @@ class WavReader:
             signed = signed and bool(np.all((top == 0) | (top == -1)))
             unsigned = unsigned and not np.any(block >> 32 - spare)
         low = signed or unsigned
-        bits, sample_bytes = self._layout.bits, self._layout.sample_bytes
+        bits, sample_bytes = self._format.bits, self._format.sample_bytes
         where = f"{self.path}: {bits} bits in {sample_bytes} bytes"
         if not (low or high):
             raise MuteError(f"{where}, but its samples use them all")
@@ -200,10 +206,10 @@ class WavReader:
         """Return how many samples have a value at which converters clip. Shape: (channels,)."""
         if self.is_float:  # which can go on beyond 1, so only 1 itself is suspicious
             return np.count_nonzero(np.abs(block) == 1.0, axis=1)
-        largest = _LARGEST_CODES.get(self._sound.subtype)
+        largest = _LARGEST_CODES.get(self._format.subtype)
         if largest is not None:
             return np.count_nonzero(np.abs(block) >= largest, axis=1)
-        largest = 1.0 - 2.0 ** (1 - self._layout.bits)
+        largest = 1.0 - 2.0 ** (1 - self._format.bits)
         return np.count_nonzero((block >= largest) | (block <= -1.0), axis=1)
 
 
