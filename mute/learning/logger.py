@@ -25,7 +25,7 @@ from rsl_rl.utils.logger import Logger
 from torch.utils.tensorboard import SummaryWriter
 
 from mute.learning.distributed import Ranks
-from mute.support.files import told_of_file, write_file
+from mute.support.files import DiskError, told_of_file, write_file
 
 __all__ = ["CurveWriter", "MeanCurves", "TrainingLogger", "quiet_writer_thread"]
 
@@ -33,6 +33,9 @@ _LOG = logging.getLogger(__name__)
 
 _CLOCK_TICK = 0.05
 """What a file's time may be behind the clock, s."""
+
+_LAST_WORD = 1.0
+"""Longest wait for a thread that has failed to say so, s."""
 
 
 class CurveWriter(LogWriter):
@@ -152,6 +155,8 @@ class TrainingLogger(Logger):
         # rsl_rl averages the last 100 episodes, which are those of all ranks together here as well.
         kept = max(1, 100 // ranks.world_size)
         self.rewbuffer, self.lenbuffer = deque(maxlen=kept), deque(maxlen=kept)
+        self.disk_error: DiskError | None = None
+        """Why curves could not be written, from the iteration on in which that was met."""
         self._measure = measure
         self._on_begin = on_begin
         self._on_iteration = on_iteration
@@ -172,16 +177,23 @@ class TrainingLogger(Logger):
         self._on_begin()
 
     def log(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401
-        """Log an iteration, see `Logger.log`; show it on the display instead of the console."""
-        with contextlib.redirect_stdout(io.StringIO()):
-            super().log(*args, **kwargs)
+        """Log an iteration, see `Logger.log`; show it on the display instead of the console.
+
+        A disk that refuses is kept in `disk_error`: the iteration has been learnt, and what comes
+        of it is to be saved before anything else.
+        """
         # rsl_rl's runner names every argument.
         iteration, total = kwargs["it"], kwargs["total_it"]
         scalars: dict[str, float] = {}
-        if isinstance(self.writer, CurveWriter | MeanCurves):
-            for tag, value in self._measure(iteration).items():
-                self.writer.add_scalar(tag, value, iteration)
-            scalars = self.writer.end_iteration(iteration)
+        try:
+            with contextlib.redirect_stdout(io.StringIO()):
+                super().log(*args, **kwargs)
+            if isinstance(self.writer, CurveWriter | MeanCurves):
+                for tag, value in self._measure(iteration).items():
+                    self.writer.add_scalar(tag, value, iteration)
+                scalars = self.writer.end_iteration(iteration)
+        except DiskError as error:
+            self.disk_error = error
         self._on_iteration(iteration, total, scalars)
 
     def state_dict(self) -> dict[str, Any]:
@@ -214,7 +226,7 @@ def quiet_writer_thread() -> Iterator[None]:
 
     It hands that on to the next call of its writer, where it becomes one line.
     """
-    report = threading.excepthook
+    report, others = threading.excepthook, set(threading.enumerate())
 
     def tell(args: threading.ExceptHookArgs) -> None:
         if not (isinstance(args.exc_value, OSError) and _passes_tensorboard(args.exc_value)):
@@ -223,6 +235,11 @@ def quiet_writer_thread() -> Iterator[None]:
     threading.excepthook = tell
     try:
         yield
+    except DiskError:
+        # Its own report may come after that call of its writer.
+        for thread in set(threading.enumerate()) - others:
+            thread.join(_LAST_WORD)
+        raise
     finally:
         threading.excepthook = report
 

@@ -143,7 +143,7 @@ class MuteRunner(OnPolicyRunner):
 
         Raises:
             CheckpointError: If a checkpoint cannot be written.
-            DiskError: If curves cannot be written.
+            DiskError: If curves cannot be written; what is learnt is saved if there is room for it.
             DivergedError: If something is no longer finite; nothing of that iteration is kept.
         """
         first, updates = self.current_learning_iteration, self.alg.updates
@@ -152,16 +152,19 @@ class MuteRunner(OnPolicyRunner):
             try:
                 self._agree()
                 self.learn(left, init_at_random_ep_len=self.robots_anew)
+                finished = True
             except _StopTraining:
+                finished = False
                 if self.logger.log_dir is not None:
                     self.save(str(self.checkpoint_path()))
                 self.logger.stop_logging_writer()  # writes out the last curves
-                return False
             except DivergedError as error:
                 self.logger.stop_logging_writer()
                 iteration = first + self.alg.updates - updates
                 raise DivergedError(f"iteration {iteration}: {error}") from error
-        return True
+            if self.logger.disk_error is not None:
+                raise self.logger.disk_error
+        return finished
 
     def checkpoint_path(self) -> Path:
         """Return the path of the checkpoint of the last finished iteration.
@@ -287,8 +290,9 @@ class MuteRunner(OnPolicyRunner):
         if self._on_iteration is not None:
             # Between two trials the display goes on showing the last one's levels.
             self._on_iteration(iteration, total, self._levels | scalars)
-        # A signal may reach one rank alone, or another one an iteration later.
-        if self.ranks.any(self.stop.number is not None) and iteration + 1 < total:
+        # A signal may reach one rank alone, or another one an iteration later; one writes curves.
+        asked = self.stop.number is not None or self.logger.disk_error is not None
+        if self.ranks.any(asked) and iteration + 1 < total:
             raise _StopTraining
 
     def _agree(self) -> None:

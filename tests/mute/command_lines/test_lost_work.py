@@ -9,12 +9,13 @@ import shlex
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 import yaml
 from places import REPOSITORY, SHIPPED_POLICY
+from tensorboard.summary.writer.record_writer import RecordWriter
 from training_process import TINY, start_training, stop_after
 
 from mute.checkpoint import load_checkpoint
@@ -31,14 +32,14 @@ def _train(*arguments: str) -> int:
     return stop.value.code
 
 
-def _at_iteration(monkeypatch: pytest.MonkeyPatch, asked: int, number: signal.Signals) -> None:
-    """Send this process a signal as it shows an iteration."""
+def _at_iteration(monkeypatch: pytest.MonkeyPatch, asked: int, act: Callable[[], object]) -> None:
+    """Do something in this process as it shows an iteration, of which the first is 0."""
     show = PlainDisplay.update
 
     def update(self: PlainDisplay, iteration: int, total: int, scalars: dict[str, float]) -> None:
         show(self, iteration, total, scalars)
         if iteration == asked:
-            signal.raise_signal(number)
+            act()
 
     monkeypatch.setattr(PlainDisplay, "update", update)
 
@@ -92,7 +93,7 @@ def test_before_a_training_begins_a_signal_ends_it_in_one_line(
 
 def test_the_hint_goes_on_as_a_shell_reads_it(tmp_path, capsys, monkeypatch):
     log_dir = tmp_path / "my runs, o'clock"
-    _at_iteration(monkeypatch, 1, signal.SIGTERM)
+    _at_iteration(monkeypatch, 1, lambda: signal.raise_signal(signal.SIGTERM))
     assert _train("--iterations", "3", "--log-dir", str(log_dir)) == 128 + signal.SIGTERM
     (hint,) = (
         line.removeprefix("go on with: ")
@@ -249,6 +250,44 @@ def test_a_checkpoint_that_finds_the_disk_full_is_told_with_the_one_before(
     assert _last_named(error) == run / "model_1.pt"
     assert f"cannot write checkpoint {run / 'model_2.pt'}: " in error
     assert {path.name for path in run.glob("model*")} == {"model_0.pt", "model_1.pt"}
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+@pytest.mark.parametrize("iterations", ["9", "4"], ids=["amid a run", "at its end"])
+def test_curves_that_find_the_disk_full_cost_no_iteration(
+    iterations, tmp_path, capsys, monkeypatch
+):
+    run = tmp_path / "go1_mute" / "a"
+
+    def fill_up() -> None:
+        (run / "curves.jsonl").unlink()
+        (run / "curves.jsonl").symlink_to("/dev/full")
+
+    _at_iteration(monkeypatch, 2, fill_up)
+    words = ("--iterations", iterations, "--log-dir", str(tmp_path), "--run-name", "a")
+    assert _train(*words) == 2
+    _, error = capsys.readouterr().err.splitlines(keepends=True)
+    assert f"cannot write {run / 'curves.jsonl'}: " in error
+    assert _last_named(error) == run / "model_3.pt"
+    assert load_checkpoint(run / "model_3.pt")["iter"] == 3
+
+
+@pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
+def test_what_tensorboard_cannot_write_costs_no_iteration(tmp_path, capsys, monkeypatch):
+    def refuse(*arguments: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    _at_iteration(monkeypatch, 2, lambda: monkeypatch.setattr(RecordWriter, "write", refuse))
+    words = ("--iterations", "99", "--log-dir", str(tmp_path), "--run-name", "a")
+    assert _train(*words) == 2
+    out, err = capsys.readouterr()
+    _, error = err.splitlines(keepends=True)
+    run = tmp_path / "go1_mute" / "a"
+    assert f"cannot write TensorBoard's curves in {run}: " in error
+    learnt = len(out.splitlines()) - 1
+    assert 3 <= learnt < 98
+    assert _last_named(error) == run / f"model_{learnt}.pt"
+    assert load_checkpoint(run / f"model_{learnt}.pt")["iter"] == learnt
 
 
 def test_parameters_that_find_the_disk_full_leave_no_run(tmp_path, capsys, monkeypatch):
