@@ -67,16 +67,15 @@ def read_results(args: CardArgs) -> ResultFiles:
         MuteError: If one is missing.
     """
     beside = args.noise.parent
-    docs = beside.parent
     return ResultFiles(
         card=_read(args.card),
         trainings={
-            "seed 0, commit f3815da": _read(docs / "seeds" / "seed0_f3815da.json"),
-            "seed 0, commit af4151a": _read(docs / "seeds" / "seed0_af4151a.json"),
-            "seed 1, commit between the first two": _read(docs / "seeds" / "seed1.json"),
+            "seed 0, commit f3815da": _read(_DOCS / "seeds" / "seed0_f3815da.json"),
+            "seed 0, commit af4151a": _read(_DOCS / "seeds" / "seed0_af4151a.json"),
+            "seed 1, commit between the first two": _read(_DOCS / "seeds" / "seed1.json"),
         },
-        progress=_read(docs / "progress.json"),
-        paper_task=_read(docs / "go1_mute_paper.json"),
+        progress=_read(_DOCS / "progress.json"),
+        paper_task=_read(_DOCS / "go1_mute_paper.json"),
         noise=_read(args.noise),
         sweep_speed=_read(beside / "sweep_speed.json"),
         sweep_beta=_read(beside / "sweep_beta.json"),
