@@ -87,14 +87,14 @@ def _gymnasium(_num_envs: int, task: str) -> Peer:
     from mute.envs.quadruped_env import NUM_ACTIONS
 
     sys.path.insert(0, str(Path(__file__).parent))  # -P leaves it out
-    from plain_go1 import PlainGo1
+    from bare_go1 import BareGo1
 
     from mute.support.threads import usable_cores
     from mute.tasks import make_task
 
     cfg = make_task(task).env
     robots = _WORKERS_PER_CORE * usable_cores()
-    env = AsyncVectorEnv([lambda: PlainGo1(cfg)] * robots)
+    env = AsyncVectorEnv([lambda: BareGo1(cfg)] * robots)
     env.reset(seed=0)
     shape = (_ACTION_SETS, robots, NUM_ACTIONS)
     noise = np.random.default_rng(0).standard_normal(shape, np.float32)

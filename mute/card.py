@@ -1,4 +1,4 @@
-"""Print a policy's card, its noise and a benchmark as tables: python -m mute.card."""
+"""Write what was measured as pages: python -m mute.card --out docs."""
 
 from __future__ import annotations
 

@@ -10,5 +10,5 @@ On the way from the physics to a level:
   in a `tally`; `live_listener` is one for the first robot of a walk that is watched.
 
 `metering` measures levels, of robots and of real recordings alike, and `files` holds WAV files.
-Which sounds and films of a walk are kept is `mute.rendering.recordings`'.
+Which sounds and films of a walk are kept is `mute.rendering.kept_walks`'.
 """

@@ -15,6 +15,7 @@ from mute.command_lines.card_benchmark import BenchmarkFiles, benchmark_page
 from mute.command_lines.card_results import ResultFiles, results_page
 from mute.evaluation.tables import read_json
 from mute.support.errors import MuteError
+from mute.support.files import write_file
 from mute.support.provenance import REPOSITORY
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK
@@ -42,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status.
 
     Raises:
-        MuteError: If a file is missing.
+        MuteError: If a file is missing, or a page cannot be written.
     """
     argv = command_line() if argv is None else list(argv)
     args = parse(CardArgs, argv, "Write what was measured as pages in Markdown.")
@@ -55,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     make_directory(args.out)
     for name, page in pages.items():
-        (args.out / name).write_text(page, encoding="utf-8")
+        write_file(args.out / name, page.encode())
     print(f"written to {args.out}: {', '.join(pages)}")
     return 0
 

@@ -75,7 +75,7 @@ def release() -> NoReturn:
 
 
 def card() -> NoReturn:
-    """Print a policy's card as tables: `python -m mute.card`."""
+    """Write what was measured as pages: `python -m mute.card`."""
     _start("card")
 
 

@@ -38,7 +38,7 @@ from mute.command_lines.sound_options import (
 from mute.evaluation.noise_levels import SETTLE_TIME, NoiseRow, NoiseSetting, measure_noise
 from mute.evaluation.plotting import check_matplotlib
 from mute.evaluation.tables import print_table, write_csv, write_json
-from mute.rendering.recordings import Recordings
+from mute.rendering.kept_walks import KeptWalks
 from mute.support.errors import MuteError
 from mute.support.ranges import Range
 
@@ -181,7 +181,7 @@ def _run(
     _check_films(args.video, len(args.beta) * len(speeds))
     settings = [NoiseSetting(beta, speed) for beta in args.beta for speed in speeds]
     kept = [
-        Recordings(wav, video, tell)
+        KeptWalks(wav, video, tell)
         for wav, video in zip(_files(args.wav, labels), _files(args.video, labels), strict=True)
     ]
     args = args.with_policy_found()
@@ -196,7 +196,7 @@ def _measure(
     args: _CommonArgs,
     surfaces: Sequence[str],
     settings: Sequence[NoiseSetting],
-    kept: Sequence[Recordings],
+    kept: Sequence[KeptWalks],
 ) -> list[NoiseRow]:
     """Return the rows of every setting on every floor.
 

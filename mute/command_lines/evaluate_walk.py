@@ -32,7 +32,7 @@ from mute.evaluation.course.course import Course, load_course
 from mute.evaluation.course.long_walk import Walk, follow_course, make_walk_env
 from mute.evaluation.plotting import check_matplotlib
 from mute.evaluation.tables import print_table, write_csv, write_json
-from mute.rendering.recordings import Recordings
+from mute.rendering.kept_walks import KeptWalks
 from mute.support.provenance import REPOSITORY
 from mute.support.resources import RESOURCES
 
@@ -101,9 +101,9 @@ def walk(args: WalkArgs) -> None:
     tell_kept([keep])
 
 
-def _recordings(args: WalkArgs) -> Recordings:
+def _recordings(args: WalkArgs) -> KeptWalks:
     wav = {0: args.wav} if args.wav else {}
-    return Recordings(wav, {0: args.video} if args.video else {}, tell)
+    return KeptWalks(wav, {0: args.video} if args.video else {}, tell)
 
 
 def _write(

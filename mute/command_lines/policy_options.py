@@ -71,6 +71,6 @@ def _that_ships(task: str) -> Path:
     if not path.is_file():
         raise MuteError(
             f"no policy ships for task {task!r} ({path} is missing): learn one with "
-            f"python train.py --task {task}, or name one with --policy"
+            f"train.py --task {task} (installed, mute-train), or name one with --policy"
         )
     return path

@@ -20,7 +20,7 @@ from mute.command_lines.arguments import Words, check_distinct
 from mute.command_lines.policy_options import PolicyArgs
 from mute.controllers import load_policy
 from mute.controllers.learned import Policy
-from mute.rendering.recordings import Recordings
+from mute.rendering.kept_walks import KeptWalks
 from mute.support.errors import MuteError
 
 __all__ = [
@@ -149,8 +149,8 @@ def tell(note: str) -> None:
     print(note, file=sys.stderr)
 
 
-def tell_kept(recordings: Iterable[Recordings]) -> None:
+def tell_kept(kept: Iterable[KeptWalks]) -> None:
     """Print which sounds and films have been kept, if any."""
-    paths = [str(path) for walks in recordings for path in walks.kept]
+    paths = [str(path) for walks in kept for path in walks.kept]
     if paths:
         print(f"kept: {', '.join(paths)}")

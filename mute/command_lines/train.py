@@ -50,7 +50,7 @@ from mute.learning.run_directory import (
     started_command,
     write_parameters,
 )
-from mute.learning.runner import MuteRunner, Progress
+from mute.learning.runner import MuteRunner, OnIteration
 from mute.learning.saved_state import check_iteration
 from mute.support.errors import EXIT_USER_ERROR, MuteError
 from mute.support.files import DiskError
@@ -195,7 +195,7 @@ def _make_runner(
     run_dir: Path,
     ranks: Ranks,
     kind: str,
-    on_iteration: Progress,
+    on_iteration: OnIteration,
 ) -> MuteRunner:
     shown = on_iteration if ranks.first else None
     try:

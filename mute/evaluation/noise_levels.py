@@ -23,7 +23,7 @@ from mute.controllers.learned import Policy
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.gait import Gait
 from mute.evaluation.trials import evaluation_cfg, run_trial
-from mute.rendering.recordings import Recordings, filming
+from mute.rendering.kept_walks import KeptWalks, filming
 
 __all__ = [
     "SETTLE_TIME",
@@ -115,7 +115,7 @@ def measure_noise(
     seconds: float,
     seed: int,
     gains: Mapping[str, float],
-    keep: Recordings | None = None,
+    keep: KeptWalks | None = None,
     microphone: Microphone | None = None,
     sources: Sequence[str] = SOURCES,
     from_energies: bool = False,
@@ -153,7 +153,7 @@ def measure_noise(
     for index, setting in enumerate(settings):
         chosen = slice(index * trials, (index + 1) * trials)
         commands[chosen, 0], commands[chosen, 3] = setting.command_speed, setting.beta
-    kept = (keep or Recordings()).spaced(trials)
+    kept = (keep or KeptWalks()).spaced(trials)
     steps = round((seconds + SETTLE_TIME) / env.step_dt)
     with (
         filming(env, kept, SETTLE_TIME) as films,

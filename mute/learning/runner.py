@@ -29,9 +29,9 @@ from mute.learning.symmetry import groups, tie_actor_critic, tie_estimator
 from mute.support.signals import StopRequest
 from mute.support.threads import core_share, use_collection_threads
 
-__all__ = ["MuteRunner", "NoiseProbe", "Progress", "policy_part"]
+__all__ = ["MuteRunner", "NoiseProbe", "OnIteration", "policy_part"]
 
-Progress = Callable[[int, int, dict[str, float]], None]
+OnIteration = Callable[[int, int, dict[str, float]], None]
 
 NoiseProbe = Callable[[dict[str, Any]], dict[str, float]]
 """Takes a `policy_part` and returns the modelled noise levels of its policy by curve, dBA. It uses
@@ -72,7 +72,7 @@ class MuteRunner(OnPolicyRunner):
         cfg: TaskCfg,
         log_dir: Path | None,
         device: str = "cpu",
-        on_iteration: Progress | None = None,
+        on_iteration: OnIteration | None = None,
         ranks: Ranks | None = None,
         noise_probe: NoiseProbe | None = None,
     ) -> None:

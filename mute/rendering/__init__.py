@@ -1,1 +1,1 @@
-"""Pictures of a walk: off-screen video, and a window to watch and steer in."""
+"""Pictures of a walk: which OpenGL works here, films, and the sound that goes into them."""

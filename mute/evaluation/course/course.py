@@ -1,7 +1,7 @@
 """Courses: a path over floors of several kinds, read from a YAML file.
 
 A course says where to walk, how fast, and what lies under the feet. How a robot keeps to the path
-is left to `path_following`, the walk itself to `walk`.
+is left to `path_following`, the walk itself to `long_walk`.
 """
 
 from __future__ import annotations

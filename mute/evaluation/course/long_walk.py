@@ -32,7 +32,7 @@ from mute.evaluation.gait import Gait
 from mute.evaluation.noise_levels import SETTLE_TIME
 from mute.evaluation.session import Session
 from mute.evaluation.trials import evaluation_cfg
-from mute.rendering.recordings import Recordings, filming
+from mute.rendering.kept_walks import KeptWalks, filming
 
 __all__ = ["FloorLevel", "Track", "Walk", "follow_course", "make_walk_env", "time_limit"]
 
@@ -166,7 +166,7 @@ def follow_course(
     gains: Mapping[str, float] | None = None,
     seed: int = 0,
     hold_speed: bool = False,
-    keep: Recordings | None = None,
+    keep: KeptWalks | None = None,
     on_progress: Callable[[float], None] | None = None,
     microphone: Microphone | None = None,
     sources: Sequence[str] = SOURCES,
@@ -200,7 +200,7 @@ def follow_course(
     places = [_place(env)]
     deviation, commanded = 0.0, 0.0
     end: End = "time limit"
-    kept = keep or Recordings()
+    kept = keep or KeptWalks()
     with (
         filming(env, kept, SETTLE_TIME) as films,
         Listener(

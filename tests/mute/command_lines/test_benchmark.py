@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from bare_go1 import BareGo1
 from mjbatch import Batch
-from plain_go1 import PlainGo1
 
 from mute.command_lines import benchmark
 from mute.command_lines.benchmark_peers import PeerRate, peer_names, time_peer
@@ -138,7 +138,7 @@ def test_the_robots_of_gymnasium_move_as_those_of_the_engine():
     batch = Batch(model, 1)
     ctrl, qpos = batch.bind("ctrl"), batch.bind("qpos")
     batch.reset(keyframe=model.key("stand").id)
-    robot = PlainGo1(cfg)
+    robot = BareGo1(cfg)
     start, _ = robot.reset(seed=0)
     observation = start
     for action in 0.1 * np.random.default_rng(0).standard_normal((20, NUM_ACTIONS)):

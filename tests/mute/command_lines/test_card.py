@@ -86,3 +86,10 @@ def test_markdown_formats_each_column_and_leaves_a_dash_for_what_is_missing():
 def test_a_file_that_is_missing_is_named(tmp_path):
     with pytest.raises(MuteError, match="nowhere"):
         card.main(["--card", str(tmp_path / "nowhere.json")])
+
+
+def test_a_page_that_cannot_be_written_is_told_in_one_line_and_leaves_nothing_beside(tmp_path):
+    (tmp_path / "results.md").mkdir()
+    with pytest.raises(MuteError, match=r"cannot write .*results\.md"):
+        card.main(["--out", str(tmp_path)])
+    assert [path.name for path in tmp_path.iterdir()] == ["results.md"]

@@ -25,7 +25,7 @@ from mute.controllers import LearnedController, load_policy
 from mute.evaluation.course.course import Course, FloorArea
 from mute.evaluation.course.long_walk import Walk, follow_course, make_walk_env, time_limit
 from mute.evaluation.session import Session
-from mute.rendering.recordings import Recordings
+from mute.rendering.kept_walks import KeptWalks
 from mute.support.errors import MuteError
 
 POLICY = SHIPPED_POLICY
@@ -86,7 +86,7 @@ def test_the_walk_is_louder_than_the_fan_and_the_peak_is_above_the_mean(walk):
 
 def test_keeping_the_sound_changes_no_figure(walk, tmp_path):
     path = tmp_path / "walk.wav"
-    assert _walk(COURSE, keep=Recordings({0: path})).figures() == walk.figures()
+    assert _walk(COURSE, keep=KeptWalks({0: path})).figures() == walk.figures()
     samples, rate = read_wav(path)
     # The file begins once the robot has settled, and holds what is measured.
     assert samples.shape[1] / rate == pytest.approx(walk.seconds - 1.0)
@@ -167,7 +167,7 @@ def test_a_simulation_that_blows_up_ends_the_walk_and_is_no_fall(tmp_path, monke
 def test_a_fall_before_the_first_reading_has_no_level_and_no_sound(tmp_path):
     env = make_walk_env(load_policy(POLICY).cfg.env, STRAIGHT, seed=1)
     notes = []
-    keep = Recordings({0: tmp_path / "fall.wav"}, on_note=notes.append)
+    keep = KeptWalks({0: tmp_path / "fall.wav"}, on_note=notes.append)
     result = follow_course(env, _Falling(env, step=5), STRAIGHT, beta=0.0, keep=keep)
     assert list(tmp_path.iterdir()) == []
     assert "fall.wav is not written: the walk ended before" in notes[0]

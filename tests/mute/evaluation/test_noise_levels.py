@@ -28,7 +28,7 @@ from mute.evaluation import noise_probe
 from mute.evaluation.noise_levels import NoiseRow, NoiseSetting, measure_noise
 from mute.evaluation.noise_probe import NoiseProbe
 from mute.evaluation.paper_levels import PAPER_LEVELS
-from mute.rendering.recordings import Recordings
+from mute.rendering.kept_walks import KeptWalks
 from mute.support.errors import MuteError
 
 
@@ -184,7 +184,7 @@ def test_a_policy_that_acts_between_the_physics_steps_has_no_level():
 def test_clipped_samples_are_told_with_their_file(tmp_path, monkeypatch):
     monkeypatch.setattr(listener, "WAV_FULL_SCALE", 0.01)
     told = []
-    keep = Recordings({0: tmp_path / "loud.wav"}, on_note=told.append)
+    keep = KeptWalks({0: tmp_path / "loud.wav"}, on_note=told.append)
     _measure(seed=1, trials=1, seconds=0.5, keep=keep)
     (note,) = told
     assert re.fullmatch(rf"{tmp_path}/loud.wav: [1-9]\d+ samples are clipped", note)

@@ -10,7 +10,7 @@ from mute.acoustics.files.writing import WavWriter
 from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
-from mute.rendering.recordings import Recordings, filming
+from mute.rendering.kept_walks import KeptWalks, filming
 from mute.support.errors import MuteError
 
 
@@ -30,7 +30,7 @@ def _no_pictures(monkeypatch):
 def test_what_never_began_leaves_no_file_and_is_told(env, tmp_path, stopped):
     wav, film, notes = tmp_path / "walk.wav", tmp_path / "walk.mp4", []
 
-    wanted = Recordings({0: wav}, {0: film}, notes.append)
+    wanted = KeptWalks({0: wav}, {0: film}, notes.append)
 
     def walk():
         with filming(env, wanted, start=1.0) as films:
@@ -54,7 +54,7 @@ def test_what_never_began_leaves_no_file_and_is_told(env, tmp_path, stopped):
 def test_a_second_film_that_cannot_be_made_leaves_nothing_of_the_first(env, tmp_path):
     (tmp_path / "file").write_text("")
     first, second, notes = tmp_path / "first.mp4", tmp_path / "file" / "second.mp4", []
-    wanted = filming(env, Recordings({}, {0: first, 1: second}, notes.append), start=1.0)
+    wanted = filming(env, KeptWalks({}, {0: first, 1: second}, notes.append), start=1.0)
     with pytest.raises(MuteError, match=r"--video: cannot write .*second\.mp4"), wanted:
         pass
     assert list(tmp_path.iterdir()) == [tmp_path / "file"]

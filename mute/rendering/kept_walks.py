@@ -15,11 +15,11 @@ from mute.rendering.sound_track import temporary_sound
 if TYPE_CHECKING:
     from mute.rendering.video import Video
 
-__all__ = ["Filming", "Recordings", "filming"]
+__all__ = ["Filming", "KeptWalks", "filming"]
 
 
 @dataclass(frozen=True)
-class Recordings:
+class KeptWalks:
     """What is kept of which walks, by their index."""
 
     wav: Mapping[int, Path] = field(default_factory=dict)
@@ -32,11 +32,11 @@ class Recordings:
     kept: list[Path] = field(default_factory=list)
     """The files that are whole, once their walks are over."""
 
-    def spaced(self, stride: int) -> Recordings:
+    def spaced(self, stride: int) -> KeptWalks:
         """Return the same with every index multiplied: of the first robots of groups."""
         wav = {index * stride: path for index, path in self.wav.items()}
         video = {index * stride: path for index, path in self.video.items()}
-        return Recordings(wav, video, self.on_note, self.kept)
+        return KeptWalks(wav, video, self.on_note, self.kept)
 
     def note_clipped(self, samples: Mapping[int, int]) -> None:
         """Tell of each walk whose sound has samples beyond full scale, given their numbers."""
@@ -66,12 +66,12 @@ class Filming:
 
 
 @contextlib.contextmanager
-def filming(env: QuadrupedEnv, recordings: Recordings, start: float) -> Iterator[Filming]:
+def filming(env: QuadrupedEnv, walks: KeptWalks, start: float) -> Iterator[Filming]:
     """Film robots of an environment; the films are whole on leaving.
 
     Args:
         env: Where they walk.
-        recordings: What to keep, by robot.
+        walks: What to keep, by robot.
         start: Time at which films and sounds begin, s.
 
     Raises:
@@ -79,14 +79,14 @@ def filming(env: QuadrupedEnv, recordings: Recordings, start: float) -> Iterator
     """
     extra = {
         robot: temporary_sound(path)
-        for robot, path in recordings.video.items()
-        if robot not in recordings.wav
+        for robot, path in walks.video.items()
+        if robot not in walks.wav
     }
-    sounds = {**recordings.wav, **extra}
+    sounds = {**walks.wav, **extra}
     videos: dict[int, Video] = {}
     try:
         with contextlib.ExitStack() as stack:
-            for robot, path in recordings.video.items():
+            for robot, path in walks.video.items():
                 from mute.rendering.video import Video  # an encoder, which only a film needs
 
                 video = Video(path, env, sounds[robot], robot, start)
@@ -95,23 +95,23 @@ def filming(env: QuadrupedEnv, recordings: Recordings, start: float) -> Iterator
                 videos[robot] = stack.enter_context(video)
             yield Filming(sounds, videos)
     except KeyboardInterrupt:  # which keeps what there is
-        _finish(recordings, videos)
+        _finish(walks, videos)
         raise
-    _finish(recordings, videos)
+    _finish(walks, videos)
 
 
-def _finish(recordings: Recordings, videos: Mapping[int, Video]) -> None:
+def _finish(walks: KeptWalks, videos: Mapping[int, Video]) -> None:
     """Drop sounds that never began, list what is kept, and tell of what is not as wished."""
-    for path in filter(Path.exists, recordings.wav.values()):
+    for path in filter(Path.exists, walks.wav.values()):
         if has_samples(path):
-            recordings.kept.append(path)
+            walks.kept.append(path)
         else:
             path.unlink()
-            recordings.on_note(f"{path} is not written: the walk ended before its sound began")
+            walks.on_note(f"{path} is not written: the walk ended before its sound began")
     for video in videos.values():
         if video.never_began:
-            recordings.on_note(f"{video.path} is not written: the walk ended before it began")
+            walks.on_note(f"{video.path} is not written: the walk ended before it began")
         else:
-            recordings.kept.append(video.path)
+            walks.kept.append(video.path)
         if video.silent_because:
-            recordings.on_note(f"{video.path} is without sound: {video.silent_because}")
+            walks.on_note(f"{video.path} is without sound: {video.silent_because}")

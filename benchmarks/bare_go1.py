@@ -13,10 +13,10 @@ from mute.envs.quadruped_env import NUM_ACTIONS
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.scene import STAND_JOINT_POS, build_scene
 
-__all__ = ["PlainGo1"]
+__all__ = ["BareGo1"]
 
 
-class PlainGo1(gymnasium.Env[np.ndarray, np.ndarray]):
+class BareGo1(gymnasium.Env[np.ndarray, np.ndarray]):
     """One Go1 whose episode never ends and whose reward is 0.
 
     Observation: qpos and qvel, shape (37,), float64. Action: offsets from the standing pose in rad,
