@@ -80,7 +80,7 @@ def walk(args: WalkArgs) -> None:
     torch.set_num_threads(1)
     origin = sound_origin(args.policy)
     env = make_walk_env(policy.cfg.env, course, args.seed)
-    keep = _recordings(args)
+    keep = _kept_walk(args)
     with progress_bar("walk", course.length) as advance:
         result = follow_course(
             env,
@@ -101,7 +101,7 @@ def walk(args: WalkArgs) -> None:
     tell_kept([keep])
 
 
-def _recordings(args: WalkArgs) -> KeptWalks:
+def _kept_walk(args: WalkArgs) -> KeptWalks:
     wav = {0: args.wav} if args.wav else {}
     return KeptWalks(wav, {0: args.video} if args.video else {}, tell)
 
