@@ -48,8 +48,8 @@ def plan_run(of_task: Path, run_name: str, start: str) -> Path:
         MuteError: If the name is none, or a run has it.
     """
     name = run_name or start
-    if Path(name).name != name or name == "..":
-        raise MuteError(f"--run-name must be a plain name without '/', got {name!r}")
+    if Path(name).name != name or name == ".." or not name.isprintable():
+        raise MuteError(f"--run-name must be a plain name on one line without '/', got {name!r}")
     run_dir = of_task / name
     if run_name and ((run_dir / _PARAMETERS).exists() or list(run_dir.glob("model_*.pt"))):
         raise _is_taken(run_dir)

@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import resource
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -24,7 +25,7 @@ def call_apart(function: Callable[_P, _T], *arguments: _P.args, **named: _P.kwar
     """Call a function in a new process and return what it returns.
 
     The process begins empty, with this one's environment variables. What it prints goes to the
-    standard error; it ends with this call, whatever ends that.
+    standard error; it ends with this call, whatever ends that, `kill -9` too.
 
     Args:
         function: One that a new process can import: of the top level of a module, or of the program
@@ -37,7 +38,7 @@ def call_apart(function: Callable[_P, _T], *arguments: _P.args, **named: _P.kwar
     """
     others = multiprocessing.active_children()
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(1, context, initializer=_print_aside) as pool:
+    with ProcessPoolExecutor(1, context, initializer=_begin) as pool:
         try:
             with _without_interrupts():  # Ctrl-C ends it by way of this process
                 future = pool.submit(function, *arguments, **named)
@@ -51,8 +52,17 @@ def call_apart(function: Callable[_P, _T], *arguments: _P.args, **named: _P.kwar
             raise
 
 
-def _print_aside() -> None:
+def _begin() -> None:
+    """Print aside, and end when the process that waits is gone."""
     os.dup2(2, 1)
+    waiting = multiprocessing.parent_process()
+    assert waiting is not None
+
+    def end_with_it() -> None:
+        waiting.join()
+        os._exit(1)
+
+    threading.Thread(target=end_with_it, daemon=True).start()
 
 
 @contextlib.contextmanager

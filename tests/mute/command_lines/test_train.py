@@ -494,6 +494,7 @@ def test_a_training_that_diverges_stops_says_so_and_keeps_the_last_good_checkpoi
         (["--run-name", "../up"], ["--run-name", "../up"]),
         (["--run-name", ".."], ["--run-name", "'..'"]),
         (["--run-name", "."], ["--run-name", "'.'"]),
+        (["--run-name", "a\nb"], ["--run-name", r"'a\nb'"]),
         (["--bogus", "3"], ["--bogus"]),
         (["stray"], ["stray"]),
         (["--env.rewards.k", "1.5"], ["rewards.k", "1.5"]),

@@ -102,6 +102,15 @@ def test_ctrl_c_ends_the_work_in_one_line(tmp_path):
         os.kill(child, 0)
 
 
+def test_the_work_ends_where_nobody_waits_for_it_any_more(tmp_path):
+    process = _start(tmp_path, "1000")
+    assert process.stderr is not None
+    process.stderr.readline()
+    process.kill()
+    process.communicate(timeout=120)  # until the work, which has the same streams, is gone too
+    assert process.returncode == -signal.SIGKILL
+
+
 def test_the_peak_of_memory_is_the_processs_own_in_megabytes():
     mine = bytearray(300 << 20)  # what starts a process is larger than it
     command = [sys.executable, "-c", _PEAKS]

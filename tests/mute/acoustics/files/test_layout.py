@@ -135,6 +135,13 @@ def test_a_file_whose_samples_are_none_but_has_a_chunk_behind_them_has_no_sample
         read_wav(write_bytes(tmp_path, wav_bytes(1, 16, b"", after=after)))
 
 
+def test_samples_that_begin_as_a_chunk_would_are_samples(tmp_path):
+    content = wav_bytes(1, 16, b"LIST" + INT16[4:], rate=RATE, promised=0)
+    samples, warnings = read(tmp_path, content)
+    np.testing.assert_allclose(samples[2:], TONE[2:], atol=2.0**-16)
+    assert "its header promises no samples" in warnings[0]
+
+
 @pytest.mark.parametrize("missing", [1, 2, 3, 4, 101, 9600])
 def test_a_recording_of_which_the_end_is_missing_is_read_and_told(tmp_path, missing):
     content = wav_bytes(1, 16, STEREO[:-missing], 2, RATE, promised=len(STEREO))
