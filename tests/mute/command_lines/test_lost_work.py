@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from finished_run import train_tiny
 from places import REPOSITORY, SHIPPED_POLICY
 from tensorboard.summary.writer.record_writer import RecordWriter
 from training_process import TINY, start_training, stop_after
@@ -21,15 +22,6 @@ from training_process import TINY, start_training, stop_after
 from mute.checkpoint import load_checkpoint
 from mute.command_lines import train
 from mute.learning.displays import PlainDisplay
-from mute.support.errors import run_cli
-
-
-def _train(*arguments: str) -> int:
-    """Run the command in this process and return its exit status."""
-    with pytest.raises(SystemExit) as stop:
-        run_cli(lambda: train.main([*TINY, *arguments]))
-    assert isinstance(stop.value.code, int)
-    return stop.value.code
 
 
 def _at_iteration(monkeypatch: pytest.MonkeyPatch, asked: int, act: Callable[[], object]) -> None:
@@ -83,7 +75,7 @@ def test_before_a_training_begins_a_signal_ends_it_in_one_line(
     number, tmp_path, capsys, monkeypatch
 ):
     monkeypatch.setattr(train, "MuteRunner", lambda *args: signal.raise_signal(number))
-    assert _train("--log-dir", str(tmp_path / "runs")) == 128 + number
+    assert train_tiny("--log-dir", str(tmp_path / "runs")) == 128 + number
     assert capsys.readouterr().err == "interrupted\n"
     assert not (tmp_path / "runs").exists()
 
@@ -94,7 +86,7 @@ def test_before_a_training_begins_a_signal_ends_it_in_one_line(
 def test_the_hint_goes_on_as_a_shell_reads_it(tmp_path, capsys, monkeypatch):
     log_dir = tmp_path / "my runs, o'clock"
     _at_iteration(monkeypatch, 1, lambda: signal.raise_signal(signal.SIGTERM))
-    assert _train("--iterations", "3", "--log-dir", str(log_dir)) == 128 + signal.SIGTERM
+    assert train_tiny("--iterations", "3", "--log-dir", str(log_dir)) == 128 + signal.SIGTERM
     (hint,) = (
         line.removeprefix("go on with: ")
         for line in capsys.readouterr().err.splitlines()
@@ -113,7 +105,7 @@ def test_two_runs_begun_in_the_same_second_are_both_kept(tmp_path, capsys, monke
     monkeypatch.setattr(train.time, "strftime", lambda form: "2026-01-02_03-04-05")
     for seed in ("1", "2"):
         words = ("--iterations", "1", "--seed", seed, "--log-dir", str(tmp_path))
-        assert _train(*words) == 0
+        assert train_tiny(*words) == 0
     said = capsys.readouterr().err
     for name, seed in (("2026-01-02_03-04-05", 1), ("2026-01-02_03-04-05-1", 2)):
         run = tmp_path / "go1_mute" / name
@@ -244,7 +236,7 @@ def test_a_checkpoint_that_finds_the_disk_full_is_told_with_the_one_before(
 
     monkeypatch.setattr("mute.support.files.os.replace", replace_but_one)
     words = ("--iterations", "9", "--agent.save-interval", "1", "--log-dir", str(tmp_path))
-    assert _train(*words) == 2
+    assert train_tiny(*words) == 2
     run_line, error = capsys.readouterr().err.splitlines(keepends=True)
     run = Path(run_line.split()[-1])
     assert _last_named(error) == run / "model_1.pt"
@@ -265,7 +257,7 @@ def test_curves_that_find_the_disk_full_cost_no_iteration(
 
     _at_iteration(monkeypatch, 2, fill_up)
     words = ("--iterations", iterations, "--log-dir", str(tmp_path), "--run-name", "a")
-    assert _train(*words) == 2
+    assert train_tiny(*words) == 2
     _, error = capsys.readouterr().err.splitlines(keepends=True)
     assert f"cannot write {run / 'curves.jsonl'}: " in error
     assert _last_named(error) == run / "model_3.pt"
@@ -279,7 +271,7 @@ def test_what_tensorboard_cannot_write_costs_no_iteration(tmp_path, capsys, monk
 
     _at_iteration(monkeypatch, 2, lambda: monkeypatch.setattr(RecordWriter, "write", refuse))
     words = ("--iterations", "99", "--log-dir", str(tmp_path), "--run-name", "a")
-    assert _train(*words) == 2
+    assert train_tiny(*words) == 2
     out, err = capsys.readouterr()
     _, error = err.splitlines(keepends=True)
     run = tmp_path / "go1_mute" / "a"
@@ -295,7 +287,7 @@ def test_parameters_that_find_the_disk_full_leave_no_run(tmp_path, capsys, monke
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr("mute.support.files.os.replace", refuse)
-    assert _train("--log-dir", str(tmp_path), "--run-name", "a") == 2
+    assert train_tiny("--log-dir", str(tmp_path), "--run-name", "a") == 2
     path = tmp_path / "go1_mute" / "a" / "config.yaml"
     assert capsys.readouterr().err == f"error: cannot write {path}: No space left on device\n"
     assert not path.parent.exists()
