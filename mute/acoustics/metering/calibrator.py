@@ -6,7 +6,8 @@ knock at the end or a second of silence before does not move, as it would the me
 A-weighting at the calibrator's frequency, 0 dB at 1 kHz, is taken out again. A-weighted, because
 hum, wind and an offset are then kept out.
 
-What is no such tone is refused; what is, but not a steady one all the time, is told.
+What is no such tone, or is steady for less than half of the readings, is refused; what is steady
+for most of them, but not for all, is told.
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ __all__ = ["Calibration", "Calibrator", "ToneMeter", "calibrate"]
 
 _STEADY = 0.2
 """Largest difference between two readings of a steady tone, dB (chosen)."""
+
+_STEADY_SHARE = 0.5
+"""Smallest share of the readings that are so close to their median, which then is the tone's."""
 
 _ALIKE = 6.0
 """Largest difference between the channels of a calibration recording, dB (chosen)."""
@@ -76,6 +80,8 @@ class _Tone:
     """Median of the readings, dBFS(A)."""
     spread: float
     """Largest less smallest reading, dB; infinite with digital silence among them."""
+    steady: float
+    """Share of the readings that are as close to the median as those of a steady tone."""
     share: float
     """Share of the energy at the calibrator's frequency; the median of the segments."""
     loudest: float
@@ -127,14 +133,16 @@ class ToneMeter:
         risen = -np.expm1(-self._detector.reading_times / TIME_CONSTANTS["fast"])
         readings = readings - 10.0 * np.log10(risen)
         shares, loudest = np.median(self._shares, axis=0), np.median(self._loudest, axis=0)
+        levels = np.median(readings, axis=1)
         return [
             _Tone(
-                level=float(np.median(own)),
+                level=float(level),
                 spread=0.0 if own.max() == -math.inf else float(own.max() - own.min()),
+                steady=float(np.mean((own >= level - _STEADY) & (own <= level + _STEADY))),
                 share=float(share),
                 loudest=float(frequency),
             )
-            for own, share, frequency in zip(readings, shares, loudest, strict=True)
+            for own, level, share, frequency in zip(readings, levels, shares, loudest, strict=True)
         ]
 
     def _look_at(self, segment: NDArray[np.float64]) -> None:
@@ -155,7 +163,7 @@ def calibrate(wav: WavReader, calibrator: Calibrator, channels: list[int]) -> Ca
 
     Raises:
         MuteError: If the recording is too short, silent, of one channel of several, or is not of
-            the calibrator's tone.
+            the calibrator's tone for half of the time.
     """
     if not calibrator.frequency < 0.45 * wav.sample_rate:
         raise MuteError(
@@ -188,7 +196,7 @@ def _check_levels(wav: WavReader, tones: list[_Tone]) -> None:
     """
     levels = [tone.level for tone in tones]
     if max(levels) < _SILENT:
-        raise MuteError(f"{wav.path}: silent, there is no calibrator's tone in it")
+        raise MuteError(f"{wav.path}: silent half of the time or more, not a calibrator's tone")
     difference = max(levels) - min(levels)
     if difference > _ALIKE:
         raise MuteError(
@@ -198,18 +206,22 @@ def _check_levels(wav: WavReader, tones: list[_Tone]) -> None:
 
 
 def _check_tone(wav: WavReader, tone: _Tone, calibrator: Calibrator) -> None:
-    """Refuse what is no tone at the calibrator's frequency.
+    """Refuse what is no tone at the calibrator's frequency, or is not steady half of the time.
 
     Raises:
         MuteError: If it is none.
     """
-    if tone.share >= _TONE_SHARE:
-        return
-    raise MuteError(
-        f"{wav.path}: not the tone of a calibrator at {calibrator.frequency:g} Hz: "
-        f"{100.0 * tone.share:.0f} % of its energy is there, and {tone.loudest:g} Hz is strongest "
-        "(--calibration-frequency names another one)"
-    )
+    if tone.share < _TONE_SHARE:
+        raise MuteError(
+            f"{wav.path}: not the tone of a calibrator at {calibrator.frequency:g} Hz: "
+            f"{100.0 * tone.share:.0f} % of its energy is there, and {tone.loudest:g} Hz is "
+            "strongest (--calibration-frequency names another one)"
+        )
+    if tone.steady < _STEADY_SHARE:
+        raise MuteError(
+            f"{wav.path}: not a steady tone: {100.0 * tone.steady:.0f} % of its readings are "
+            f"within {_STEADY:g} dB of their median, must be {100.0 * _STEADY_SHARE:.0f} % or more"
+        )
 
 
 def _doubts(wav: WavReader, channels: list[int], tones: list[_Tone]) -> tuple[str, ...]:

@@ -83,6 +83,32 @@ def test_readings_may_spread_by_a_fifth_of_a_decibel(tmp_path, change, told):
     assert bool(calibration_of(tmp_path, samples).warnings) is told
 
 
+TONE = tone(RMS, seconds=10.0)
+
+
+@pytest.mark.parametrize(
+    "samples",
+    [
+        TONE * np.linspace(1.0, 0.5, len(TONE)),
+        TONE * (1.0 + 0.5 * tone(0.7, 3.0, seconds=10.0)),
+        np.where(np.arange(len(TONE)) < 5.1 * RATE, TONE, noise(1e-3, 10.0)),
+    ],
+    ids=["fading", "trembling", "hardly longer than the noise behind it"],
+)
+def test_a_tone_that_is_not_steady_half_of_the_time_is_refused(tmp_path, samples):
+    with pytest.raises(MuteError, match=r"cal\.wav: not a steady tone: \d+ % .* within 0\.2 dB"):
+        calibration_of(tmp_path, samples)
+
+
+@pytest.mark.parametrize("tone_first", [True, False])
+def test_a_tone_for_most_of_the_time_gives_its_level(tmp_path, tone_first):
+    parts = [TONE[: 6 * RATE], noise(1e-3, 4.0)]
+    samples = np.concatenate(parts if tone_first else parts[::-1])
+    calibration = calibration_of(tmp_path, samples)
+    assert abs(error_db(calibration)[0]) < 0.2
+    assert "not a steady tone" in calibration.warnings[0]
+
+
 def test_noise_of_a_room_is_no_calibration(tmp_path):
     with pytest.raises(MuteError, match=r"cal\.wav: not the tone of a calibrator at 1000 Hz: \d %"):
         calibration_of(tmp_path, noise(1e-3, 5.0))
