@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -285,8 +286,8 @@ def _shown(row: NoiseRow) -> dict[str, str]:
     return {
         "floor": row.surface,
         "beta": f"{row.beta:g}",
-        "MNL": f"{row.mnl_mean:.1f}±{row.mnl_std:.1f}",
-        "PNL": f"{row.pnl_mean:.1f}±{row.pnl_std:.1f}",
+        "MNL": _with_spread(row.mnl_mean, row.mnl_std),
+        "PNL": _with_spread(row.pnl_mean, row.pnl_std),
         "m/s,asked": f"{row.speed_mean:.2f},{row.command_speed:.2f}",
         "err²": f"{row.velocity_error_sq:.3f}",
         "land": f"{row.landing_speed_rms:.2f}",
@@ -296,6 +297,11 @@ def _shown(row: NoiseRow) -> dict[str, str]:
         "CoT": f"{row.cost_of_transport:.2f}",
         "fell": f"{row.fall_rate:.0%}",
     }
+
+
+def _with_spread(mean: float, deviation: float) -> str:
+    """Return a level and its standard deviation, which a single trial does not have."""
+    return f"{mean:.1f}" if math.isnan(deviation) else f"{mean:.1f}±{deviation:.1f}"
 
 
 def _check(

@@ -78,6 +78,8 @@ def test_noise_prints_a_table_and_writes_csv_json_and_sound(tmp_path, capsys):
         ("tile", 0.0), ("tile", 1.0), ("carpet", 0.0), ("carpet", 1.0)
     ]  # fmt: skip
     assert rows[0]["mnl_std"] is None  # one trial has no spread
+    assert f" {rows[0]['mnl_mean']:.1f} " in shown
+    assert "±" not in shown
     names = ("tile-beta0", "tile-beta1", "carpet-beta0", "carpet-beta1")
     kept = [tmp_path / f"walk-{name}.wav" for name in names]
     for path in kept:

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 import torch
 from places import REPOSITORY
-from tensordict import TensorDict
+from standing import Standing
 
 from mute.acoustics.files.reading import read_wav
 from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
@@ -44,23 +44,9 @@ HEADLESS = {
 } | {"OMP_NUM_THREADS": "1"}
 
 
-class _Stand:
-    """Holds the stance, and remembers what it was asked to forget."""
-
-    def __init__(self, num_envs: int) -> None:
-        self.num_envs = num_envs
-        self.resets: list[torch.Tensor | None] = []
-
-    def reset(self, mask: torch.Tensor | None = None) -> None:
-        self.resets.append(mask)
-
-    def act(self, observations: TensorDict) -> torch.Tensor:
-        return torch.zeros(self.num_envs, 12)
-
-
 def _make_session(num_envs: int = 2) -> Session:
     cfg = evaluation_cfg(QuadrupedEnvCfg(num_threads=1), num_envs, seconds=10.0, seed=0)
-    return Session(QuadrupedEnv(cfg), _Stand(num_envs), Command(0.5, 0.0, 0.0, 0.5), 0.1)
+    return Session(QuadrupedEnv(cfg), Standing(num_envs), Command(0.5, 0.0, 0.0, 0.5), 0.1)
 
 
 def _play(*words: str) -> subprocess.CompletedProcess[str]:
@@ -257,46 +243,6 @@ def test_every_command_within_the_limits_passes_the_check():
     args.check()
     with pytest.raises(MuteError, match="--vx must be"):
         dataclasses.replace(args, vx=-2.01).check()
-
-
-def test_a_new_command_is_observed_and_measured_from_the_next_step_on():
-    session = _make_session()
-    for _ in range(50):
-        session.step()
-    session.recent_gait()
-    session.set_command(Command(2.0, 0.0, 0.0, 0.25))
-    assert session.env.get_observations()["policy"][0, -1] == pytest.approx(0.25)
-    for _ in range(10):
-        session.step()
-    # A robot that stands makes the error of the whole command.
-    assert session.recent_gait().velocity_error_sq == pytest.approx(4.0, abs=0.3)
-
-
-def test_a_robot_that_falls_goes_on_with_the_same_command_and_no_past():
-    session = _make_session()
-    session.set_command(Command(0.3, 0.1, -0.2, 0.9))
-    session.env.simulation.qpos[1, 3:7] = torch.tensor((0.0, 1.0, 0.0, 0.0))  # on its back
-    session.step()
-    expected = torch.tensor((0.3, 0.1, -0.2, 0.9))
-    torch.testing.assert_close(session.env.commands.command, expected.expand(2, 4))
-    controller = session.controller
-    assert isinstance(controller, _Stand)
-    forgotten = controller.resets[-1]
-    assert forgotten is not None
-    assert forgotten.tolist() == [False, True]
-    assert session.gait().fall_rate == 0.5
-
-
-def test_a_restart_forgets_figures_and_time_but_not_the_command():
-    session = _make_session()
-    session.set_command(Command(0.1, 0.2, 0.3, 0.4))
-    session.env.simulation.qpos[0, 3:7] = torch.tensor((0.0, 1.0, 0.0, 0.0))
-    session.step()
-    session.restart()
-    assert session.seconds == 0.0
-    assert session.gait().fall_rate == 0.0
-    expected = torch.tensor((0.1, 0.2, 0.3, 0.4))
-    torch.testing.assert_close(session.env.commands.command[0], expected)
 
 
 def test_what_went_wrong_is_told_and_is_no_fall(tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""A walk can be filmed and steered: backends are found, videos follow the robot, keys command."""
+"""Walks are filmed: the camera follows the robot, and films are whole, with their sound."""
 
 from __future__ import annotations
 
@@ -10,30 +10,20 @@ import sys
 from pathlib import Path
 
 import imageio.v3 as imageio
-import imageio_ffmpeg
 import numpy as np
 import pytest
-import torch
+from film_helpers import sound_of
 from places import REPOSITORY
-from tensordict import TensorDict
-from wav_helpers import write_sound
 
 from mute.acoustics.files.reading import read_wav
 from mute.acoustics.listener import SAMPLE_RATE
 from mute.checkpoint import save_checkpoint
 from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
-from mute.controllers.command import Command
-from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
-from mute.evaluation.session import Session
 from mute.learning.runner import MuteRunner, policy_part
-from mute.live.keys import press
 from mute.networks.estimator import EstimatorCfg
 from mute.rendering import backend
-from mute.rendering.sound_track import add_sound
 from mute.support.errors import MuteError
-
-UP, DOWN, LEFT, RIGHT = 265, 264, 263, 262  # GLFW's codes
 
 FILM = """
 import resource
@@ -68,18 +58,6 @@ except MuteError as error:
 """
 
 
-class _Stand:
-    """Holds the stance."""
-
-    num_envs = 1
-
-    def reset(self, mask: torch.Tensor | None = None) -> None:
-        pass
-
-    def act(self, observations: TensorDict) -> torch.Tensor:
-        return torch.zeros(1, 12)
-
-
 @pytest.fixture(scope="module")
 def environ() -> dict[str, str]:
     """Return the environment variables of a process that can render off-screen."""
@@ -88,12 +66,6 @@ def environ() -> dict[str, str]:
     except MuteError as error:
         pytest.skip(str(error))
     return {**os.environ, "MUJOCO_GL": found, "OMP_NUM_THREADS": "1"}
-
-
-@pytest.fixture
-def session() -> Session:
-    env = QuadrupedEnv(QuadrupedEnvCfg(num_envs=1, num_threads=1))
-    return Session(env, _Stand(), Command(0.5, 0.0, 0.0, 0.5))
 
 
 def _write_policy(path: Path) -> None:
@@ -135,9 +107,6 @@ def _dark_pixels(picture: np.ndarray) -> np.ndarray:
     return np.argwhere(picture.max(axis=2) < 45)
 
 
-# -- video ---------------------------------------------------------------------------------------
-
-
 def test_the_camera_follows_the_robot(films):
     frames = imageio.imread(films / "new" / "whole.mp4")
     assert frames.shape[1:] == (720, 1280, 3)
@@ -174,54 +143,10 @@ def test_play_finds_a_backend_and_a_film_that_is_interrupted_is_kept(tmp_path, e
     frames = imageio.imread(path)
     assert len(frames) >= 25
     assert np.abs(frames[0].astype(int) - frames[20]).max() > 100  # the robot moves
-    sound = _sound_of(path)
+    sound = sound_of(path)
     assert len(sound) > 0.5 * SAMPLE_RATE
     assert np.abs(sound).max() > 0.0  # the fan at least
     assert sorted(tmp_path.iterdir()) == [policy, path]
-
-
-# -- the sound of a video ------------------------------------------------------------------------
-
-
-def _sound_of(film: Path) -> np.ndarray:
-    """Return the samples of a film's sound, full scale is 1; none where it is silent."""
-    ffmpeg = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", str(film)]
-    run = subprocess.run(
-        [*ffmpeg, "-map", "0:a", "-ac", "1", "-f", "s16le", "-"], capture_output=True, check=False
-    )
-    return np.frombuffer(run.stdout, "<i2") / 32768.0
-
-
-@pytest.fixture
-def film(tmp_path: Path) -> Path:
-    """Return a silent film of half a second, as small as can be."""
-    pictures = np.linspace(0, 255, 25)[:, None, None, None] * np.ones((1, 32, 32, 3))
-    path = tmp_path / "film.mp4"
-    imageio.imwrite(path, pictures.astype(np.uint8), fps=50)
-    return path
-
-
-def test_a_film_gets_the_sound_and_keeps_its_pictures(film):
-    before = imageio.imread(film)
-    wav = film.with_name("tone.wav")
-    tone = 0.5 * np.sin(2.0 * np.pi * 1000.0 * np.arange(24000) / 48000.0)
-    write_sound(wav, tone, 48000)
-    add_sound(film, wav)
-    np.testing.assert_array_equal(imageio.imread(film), before)
-    sound = _sound_of(film)
-    assert len(sound) == pytest.approx(24000, abs=1024)  # a frame of AAC
-    assert np.sqrt(np.mean(sound[2400:21600] ** 2)) == pytest.approx(0.5 / np.sqrt(2.0), rel=0.02)
-    assert sorted(film.parent.iterdir()) == [film, wav]
-
-
-def test_a_sound_that_cannot_be_read_leaves_the_film_as_it_was(film):
-    before = film.read_bytes()
-    wav = film.with_name("broken.wav")
-    wav.write_bytes(b"no sound at all")
-    with pytest.raises(MuteError, match="Invalid data"):
-        add_sound(film, wav)
-    assert film.read_bytes() == before
-    assert sorted(film.parent.iterdir()) == [wav, film]
 
 
 _SMALL = """
@@ -260,7 +185,7 @@ def test_evaluate_films_the_first_trial_of_each_setting_with_its_sound(tmp_path,
         # It begins when the robot has settled, and the view is from where the robot begins.
         assert len(frames) / rate == pytest.approx(1.2, abs=1.5 / rate)
         assert len(_dark_pixels(frames[0])) > 250
-        sound = _sound_of(path)
+        sound = sound_of(path)
         assert len(sound) / SAMPLE_RATE == pytest.approx(1.2, abs=0.03)
         levels.append(float(np.sqrt(np.mean(sound**2))))
     assert levels[0] > 1.4 * levels[1] > 0.0
@@ -274,7 +199,7 @@ def test_a_sweep_keeps_the_sound_that_it_puts_into_a_film(tmp_path, environ):
     assert sorted(tmp_path.iterdir()) == [out, film, wav]
     kept, rate = read_wav(wav)
     assert kept.shape[1] == round(1.04 * rate)
-    heard = _sound_of(film)[: kept.shape[1]]
+    heard = sound_of(film)[: kept.shape[1]]
     assert np.std(heard) == pytest.approx(np.std(kept), rel=0.05)  # AAC is lossy
 
 
@@ -290,114 +215,6 @@ def test_a_walk_over_a_course_is_filmed_with_its_sound(tmp_path, environ):
     filmed = json.loads((out / "walk.json").read_text())["seconds"] - 1.0
     rate = imageio.immeta(film)["fps"]
     assert len(imageio.imread(film)) / rate == pytest.approx(filmed, abs=1.5 / rate)
-    sound = _sound_of(film)
+    sound = sound_of(film)
     assert len(sound) / SAMPLE_RATE == pytest.approx(filmed, abs=0.03)
     assert np.std(sound) > 0.0
-
-
-# -- backends ------------------------------------------------------------------------------------
-
-
-def _only(*working: str):
-    return lambda code, environ: environ.get("MUJOCO_GL") in working
-
-
-def test_egl_is_tried_before_osmesa(monkeypatch):
-    monkeypatch.setattr(backend, "_succeeds", _only("egl", "osmesa"))
-    assert backend.find_backend({}) == "egl"
-    monkeypatch.setattr(backend, "_succeeds", _only("osmesa"))
-    assert backend.find_backend({}) == "osmesa"
-
-
-def test_the_users_choice_goes_first(monkeypatch):
-    monkeypatch.setattr(backend, "_succeeds", _only("egl", "osmesa"))
-    assert backend.find_backend({"MUJOCO_GL": "osmesa"}) == "osmesa"
-
-
-def test_where_nothing_renders_the_packages_to_install_are_named(monkeypatch):
-    monkeypatch.setattr(backend, "_succeeds", _only())
-    with pytest.raises(MuteError, match="apt install libegl1 libgl1-mesa-dri, or libosmesa6"):
-        backend.find_backend({})
-
-
-def test_a_choice_that_does_not_work_is_told_by_its_name():
-    with pytest.raises(MuteError, match="MUJOCO_GL=crayons does not render"):
-        backend.find_backend({**os.environ, "MUJOCO_GL": "crayons"})
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing is chosen")
-def test_only_a_video_makes_a_choice(monkeypatch):
-    monkeypatch.setattr(backend, "_succeeds", _only("osmesa"))
-    monkeypatch.delenv("MUJOCO_GL", raising=False)
-    backend.configure_rendering(["--beta", "0.5"])
-    assert "MUJOCO_GL" not in os.environ
-    monkeypatch.setenv("MUJOCO_GL", "")  # restored after the test
-    backend.configure_rendering(["--video=walk.mp4"])
-    assert os.environ["MUJOCO_GL"] == "osmesa"
-
-
-@pytest.mark.parametrize(
-    ("environ", "platform", "expected"),
-    [
-        ({}, "linux", False),
-        ({"DISPLAY": ":0"}, "linux", True),
-        ({"WAYLAND_DISPLAY": "wayland-0"}, "linux", True),
-        ({}, "darwin", True),
-    ],
-)
-def test_a_display_is_known_by_its_variables(environ, platform, expected):
-    assert backend.has_display(environ, platform) is expected
-
-
-def test_a_display_that_is_named_and_gone_opens_no_window():
-    gone = {**os.environ, "DISPLAY": ":987"}
-    gone.pop("WAYLAND_DISPLAY", None)
-    assert backend.why_no_window(gone, "linux") == "no window with OpenGL opens on this display"
-
-
-def test_plain_python_on_macos_is_told_of_mjpython():
-    assert "mjpython" in (backend.why_no_window({}, "darwin") or "")
-
-
-# -- keys ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("key", "expected"),
-    [
-        (UP, Command(0.6, 0.0, 0.0, 0.5)),
-        (DOWN, Command(0.4, 0.0, 0.0, 0.5)),
-        (LEFT, Command(0.5, 0.0, 0.1, 0.5)),
-        (RIGHT, Command(0.5, 0.0, -0.1, 0.5)),
-        (ord("Q"), Command(0.5, 0.1, 0.0, 0.5)),
-        (ord("E"), Command(0.5, -0.1, 0.0, 0.5)),
-        (ord("B"), Command(0.5, 0.0, 0.0, 0.6)),
-        (ord("V"), Command(0.5, 0.0, 0.0, 0.4)),
-        (ord(" "), Command(0.0, 0.0, 0.0, 0.5)),
-        (ord("X"), Command(0.5, 0.0, 0.0, 0.5)),
-    ],
-)
-def test_a_key_changes_the_command_of_the_robots(session, key, expected):
-    press(session, key)
-    assert session.command == expected
-    torch.testing.assert_close(session.env.commands.command[0], expected.tensor())
-
-
-def test_keys_stay_within_the_limits_and_come_back_to_exactly_zero(session):
-    for _ in range(30):
-        press(session, UP)
-    assert session.command.vx == 2.0
-    for _ in range(20):
-        press(session, DOWN)
-    assert session.command.vx == 0.0
-    for _ in range(9):
-        press(session, ord("B"))
-    assert session.command.beta == 1.0
-
-
-def test_the_restart_key_begins_anew_with_the_same_command(session):
-    press(session, UP)
-    session.step()
-    press(session, ord("R"))
-    assert session.steps == 0
-    assert session.command == Command(0.6, 0.0, 0.0, 0.5)
