@@ -81,7 +81,7 @@ class EstimatorPPO(PPO):
         return super().act(obs)
 
     def process_env_step(
-        self, obs: TensorDict, rewards: Tensor, dones: Tensor, extras: dict[str, Tensor]
+        self, obs: TensorDict, rewards: Tensor, dones: Tensor, extras: dict[str, Any]
     ) -> None:
         """Record a step, see `PPO.process_env_step`; remember what of it is not finite.
 
@@ -90,6 +90,8 @@ class EstimatorPPO(PPO):
         if self._met is None:
             groups = {f"the observations '{name}'": obs[name] for name in obs.keys()}  # noqa: SIM118
             self._met = first_not_finite(groups | {"the rewards": rewards})
+            if self._met == "the rewards":
+                self._met = first_not_finite(_reward_terms(extras)) or self._met
         super().process_env_step(obs, rewards, dones, extras)
 
     def compute_returns(self, obs: TensorDict) -> None:
@@ -151,9 +153,12 @@ class EstimatorPPO(PPO):
             or first_not_finite({"the estimates": estimate})
         )
         # The others would wait for one that stops alone.
-        if self.ranks.any(found is not None):
-            met = [one for one in self.ranks.gather(found) if one is not None]
-            raise DivergedError(stopped_by(self.ranks.broadcast(met[0] if met else "")))
+        if not self.ranks.any(found is not None):
+            return
+        # What one rank met in its rollout spoils the losses of all.
+        causes = [*self.ranks.gather(self._met), *self.ranks.gather(found)]
+        first = next((cause for cause in causes if cause is not None), "")
+        raise DivergedError(stopped_by(self.ranks.broadcast(first)))
 
     def train_mode(self) -> None:
         """Set train mode for all networks."""
@@ -184,3 +189,10 @@ class EstimatorPPO(PPO):
         super().broadcast_parameters()
         for tensor in self.trainer.estimator.state_dict().values():
             torch.distributed.broadcast(tensor, src=0)
+
+
+def _reward_terms(extras: dict[str, Any]) -> dict[str, Tensor]:
+    """Return the mean of each reward term, which names the one that spoils their sum."""
+    prefix = "Reward/"
+    terms = {name: mean for name, mean in extras["log"].items() if name.startswith(prefix)}
+    return {f"the reward term '{name.removeprefix(prefix)}'": mean for name, mean in terms.items()}

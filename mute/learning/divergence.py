@@ -30,11 +30,13 @@ def first_not_finite(values: Mapping[str, Tensor]) -> str | None:
 def stopped_by(found: str) -> str:
     """Return in words why a training stops, and which option may keep it from that.
 
+    What the environment hands out is another matter than how fast is learnt from it.
+
     Args:
         found: Name of what holds NaN or infinity.
     """
+    stops = f"NaN or infinity in {found}, so the training stops and keeps nothing of this iteration"
+    if found.startswith("the reward"):
+        return stops
     option = "estimation" if "estimat" in found else "ppo"
-    return (
-        f"NaN or infinity in {found}, so the training stops and keeps nothing of this iteration; "
-        f"a smaller --agent.{option}.learning-rate may help"
-    )
+    return f"{stops}; a smaller --agent.{option}.learning-rate may help"

@@ -10,6 +10,7 @@ from learning_helpers import make_cfg, make_runner
 from rsl_rl.algorithms import PPO
 
 from mute.checkpoint import load_checkpoint
+from mute.learning.distributed import Ranks
 from mute.learning.divergence import DivergedError, first_not_finite
 from mute.learning.estimator_trainer import EstimatorTrainer
 from mute.learning.runner import MuteRunner
@@ -69,7 +70,14 @@ def test_a_training_stops_at_the_iteration_and_keeps_the_checkpoint_before(
     make_runner(iterations=6).load(str(tmp_path / "model_1.pt"))
 
 
-def test_observations_that_are_infinite_end_the_rollouts_iteration(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("logged", "words"),
+    [({}, "the rewards"), ({"Reward/spin": torch.tensor(math.inf)}, "the reward term 'spin'")],
+    ids=["rewards", "term"],
+)
+def test_rewards_that_are_infinite_end_the_rollouts_iteration_and_no_rate_is_blamed(
+    logged, words, tmp_path, monkeypatch
+):
     runner = make_runner(tmp_path, iterations=6)
     step, steps = runner.env.step, []
 
@@ -78,12 +86,32 @@ def test_observations_that_are_infinite_end_the_rollouts_iteration(tmp_path, mon
         steps.append(1)
         if len(steps) == 12:  # in the second rollout
             rewards = torch.full_like(rewards, math.inf)
+            extras["log"] |= logged
         return observations, rewards, dones, extras
 
     monkeypatch.setattr(runner.env, "step", spoilt)
-    with pytest.raises(DivergedError, match=r"^iteration 1: NaN or infinity in the rewards"):
+    with pytest.raises(DivergedError) as caught:
         runner.train()
+    assert str(caught.value) == (
+        f"iteration 1: NaN or infinity in {words}, so the training stops and keeps nothing of this "
+        "iteration"
+    )
     assert [path.name for path in tmp_path.glob("model_*")] == ["model_0.pt"]
+
+
+def test_what_another_rank_met_in_its_rollout_is_blamed_before_the_losses_that_it_spoils():
+    class SecondOfTwo(Ranks):
+        def any(self, flag):
+            return True
+
+        def gather(self, value):
+            met = "the reward term 'spin'"
+            return [value, met if value is None or "loss" in value else value]
+
+    alg = make_runner().alg
+    alg.ranks = SecondOfTwo()
+    with pytest.raises(DivergedError, match=r"^NaN or infinity in the reward term 'spin', so"):
+        alg._stop_where_not_finite({"value": math.nan})
 
 
 @pytest.mark.parametrize(
