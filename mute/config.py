@@ -76,7 +76,8 @@ class PPOCfg:
     num_learning_epochs: int = 5
     """Passes over a rollout."""
     num_mini_batches: int = 4
-    """Parts of a rollout."""
+    """Parts of a rollout, all of one size: rsl_rl leaves out the samples that are over, fewer than
+    there are parts."""
     clip_param: float = 0.2
     """Clipping range of the probability ratio and of the value."""
     gamma: float = 0.99

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
 import signal
 import subprocess
 import sys
@@ -12,18 +10,15 @@ from pathlib import Path
 import imageio.v3 as imageio
 import numpy as np
 import pytest
-from film_helpers import sound_of
+from film_helpers import dark_pixels, rendering_environment, sound_of
 from places import REPOSITORY
 
-from mute.acoustics.files.reading import read_wav
 from mute.acoustics.listener import SAMPLE_RATE
 from mute.checkpoint import save_checkpoint
 from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.learning.runner import MuteRunner, policy_part
 from mute.networks.estimator import EstimatorCfg
-from mute.rendering import backend
-from mute.support.errors import MuteError
 
 FILM = """
 import resource
@@ -60,12 +55,7 @@ except MuteError as error:
 
 @pytest.fixture(scope="module")
 def environ() -> dict[str, str]:
-    """Return the environment variables of a process that can render off-screen."""
-    try:
-        found = backend.find_backend(os.environ)
-    except MuteError as error:
-        pytest.skip(str(error))
-    return {**os.environ, "MUJOCO_GL": found, "OMP_NUM_THREADS": "1"}
+    return rendering_environment()
 
 
 def _write_policy(path: Path) -> None:
@@ -102,15 +92,10 @@ def films(tmp_path_factory: pytest.TempPathFactory, environ: dict[str, str]) -> 
     return folder
 
 
-def _dark_pixels(picture: np.ndarray) -> np.ndarray:
-    """Return where the robot's black parts are; floor and sky have none. Shape: (n, 2)."""
-    return np.argwhere(picture.max(axis=2) < 45)
-
-
 def test_the_camera_follows_the_robot(films):
     frames = imageio.imread(films / "new" / "whole.mp4")
     assert frames.shape[1:] == (720, 1280, 3)
-    first, last = _dark_pixels(frames[0]), _dark_pixels(frames[-1])
+    first, last = dark_pixels(frames[0]), dark_pixels(frames[-1])
     assert len(first) > 1000
     assert not np.array_equal(frames[0], frames[-1])  # the floor has moved
     np.testing.assert_allclose(last.mean(axis=0), first.mean(axis=0), atol=20.0)
@@ -147,74 +132,3 @@ def test_play_finds_a_backend_and_a_film_that_is_interrupted_is_kept(tmp_path, e
     assert len(sound) > 0.5 * SAMPLE_RATE
     assert np.abs(sound).max() > 0.0  # the fan at least
     assert sorted(tmp_path.iterdir()) == [policy, path]
-
-
-_SMALL = """
-import runpy, sys
-from mute.rendering import video
-video._WIDTH, video._HEIGHT = 640, 360
-sys.argv = sys.argv[1:]
-runpy.run_path(sys.argv[0], run_name="__main__")
-"""
-"""Runs a program with small pictures, each of which costs the processor a tenth of a second."""
-
-
-def _evaluate(environ: dict[str, str], *words: str | Path) -> str:
-    """Return what `evaluate.py` prints on standard output, its pictures being small."""
-    run = subprocess.run(
-        [sys.executable, "-c", _SMALL, "evaluate.py", *map(str, words)],
-        cwd=REPOSITORY,
-        env=environ,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert run.returncode == 0, run.stderr
-    return run.stdout
-
-
-def test_evaluate_films_the_first_trial_of_each_setting_with_its_sound(tmp_path, environ):
-    words = ("noise", "--surface", "wood", "--beta", "0,1", "--trials", "1", "--seconds", "1.2")
-    _evaluate(environ, *words, "--video", tmp_path / "walk.mp4", "--out", tmp_path / "out")
-    paths = [tmp_path / f"walk-wood-beta{beta}.mp4" for beta in (0, 1)]
-    assert sorted(tmp_path.iterdir()) == [tmp_path / "out", *paths]
-    levels = []
-    for path in paths:
-        rate = imageio.immeta(path)["fps"]
-        frames = imageio.imread(path)
-        # It begins when the robot has settled, and the view is from where the robot begins.
-        assert len(frames) / rate == pytest.approx(1.2, abs=1.5 / rate)
-        assert len(_dark_pixels(frames[0])) > 250
-        sound = sound_of(path)
-        assert len(sound) / SAMPLE_RATE == pytest.approx(1.2, abs=0.03)
-        levels.append(float(np.sqrt(np.mean(sound**2))))
-    assert levels[0] > 1.4 * levels[1] > 0.0
-
-
-def test_a_sweep_keeps_the_sound_that_it_puts_into_a_film(tmp_path, environ):
-    words = ("sweep-speed", "--speed", "0.5", "--beta", "1", "--trials", "1", "--seconds", "1.04")
-    wav, film, out = tmp_path / "walk.wav", tmp_path / "walk.mp4", tmp_path / "out"
-    shown = _evaluate(environ, *words, "--wav", wav, "--video", film, "--out", out)
-    assert f"kept: {wav}, {film}\n" in shown
-    assert sorted(tmp_path.iterdir()) == [out, film, wav]
-    kept, rate = read_wav(wav)
-    assert kept.shape[1] == round(1.04 * rate)
-    heard = sound_of(film)[: kept.shape[1]]
-    assert np.std(heard) == pytest.approx(np.std(kept), rel=0.05)  # AAC is lossy
-
-
-def test_a_walk_over_a_course_is_filmed_with_its_sound(tmp_path, environ):
-    course, film, out = tmp_path / "course.yaml", tmp_path / "walk.mp4", tmp_path / "out"
-    course.write_text(
-        "speed: 0.5\npath: [[0, 0], [0.6, 0]]\n"
-        "floors: [{floor: tile, low: [-1, -1], high: [2, 1]}]\n"
-    )
-    shown = _evaluate(environ, "walk", "--course", course, "--video", film, "--out", out)
-    assert f"kept: {film}\n" in shown
-    assert sorted(tmp_path.iterdir()) == [course, out, film]
-    filmed = json.loads((out / "walk.json").read_text())["seconds"] - 1.0
-    rate = imageio.immeta(film)["fps"]
-    assert len(imageio.imread(film)) / rate == pytest.approx(filmed, abs=1.5 / rate)
-    sound = sound_of(film)
-    assert len(sound) / SAMPLE_RATE == pytest.approx(filmed, abs=0.03)
-    assert np.std(sound) > 0.0
