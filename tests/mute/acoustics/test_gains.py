@@ -1,10 +1,11 @@
-"""Tests of reading the gains of the sound model from a file that is damaged."""
+"""Tests of the gains that ship, and of reading them from a file that is damaged."""
 
 from __future__ import annotations
 
 import json
 
 import pytest
+from places import REPOSITORY
 
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
@@ -48,3 +49,34 @@ def test_a_file_that_is_no_json_of_floors_is_refused_in_one_line(tmp_path, conte
         load_gains(path)
     assert str(path) in str(refusal.value)
     assert "\n" not in str(refusal.value)
+
+
+def test_the_shipped_calibration_has_every_floor_and_where_it_comes_from():
+    content = json.loads((REPOSITORY / "resources/acoustics/calibration.json").read_text())
+    assert load_gains().keys() == FLOORS.keys() == content["floors"].keys()
+    for floor in content["floors"].values():
+        assert floor["source"]
+        if "target_mnl" in floor:
+            assert floor["mnl"] == pytest.approx(floor["target_mnl"], abs=0.02)
+    assert content["command"].startswith("python -m mute.acoustics.calibration ")
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        ("", "no calibration"),
+        ("{}", "'floors' is missing"),
+        ('{"floors": {"wood": {"gain": 1}}}', "'carpet' is missing"),
+        (
+            json.dumps({"floors": {key: {"gain": -1.0} for key in FLOORS}}),
+            "wood must be a number > 0",
+        ),
+    ],
+)
+def test_a_broken_calibration_is_refused_in_one_line(content, word, tmp_path):
+    path = tmp_path / "calibration.json"
+    path.write_text(content)
+    with pytest.raises(MuteError, match=word) as caught:
+        load_gains(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)

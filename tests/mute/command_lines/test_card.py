@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
 
 import pytest
@@ -93,3 +94,17 @@ def test_a_page_that_cannot_be_written_is_told_in_one_line_and_leaves_nothing_be
     with pytest.raises(MuteError, match=r"cannot write .*results\.md"):
         card.main(["--out", str(tmp_path)])
     assert [path.name for path in tmp_path.iterdir()] == ["results.md"]
+
+
+def test_the_card_tells_levels_without_spread_and_how_many_trials_have_one(tmp_path, capsys):
+    for source in (REPOSITORY / "docs" / "noise").glob("*.json"):
+        (tmp_path / source.name).write_bytes(source.read_bytes())
+    path = tmp_path / "noise.json"
+    rows = json.loads(path.read_text())
+    rows[0] |= {"trials_heard": 1, "mnl_mean": 68.0, "mnl_std": None}
+    rows[1] |= {"trials_heard": 0, "mnl_mean": None, "mnl_std": None}
+    path.write_text(json.dumps(rows))
+    card.main(["--noise", str(path)])
+    shown = capsys.readouterr().out
+    assert "| wood | 0 | 68.0 (1 of 5 trials) |" in shown
+    assert "| wood | 1 | - |" in shown

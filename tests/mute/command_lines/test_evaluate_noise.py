@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import hashlib
 import json
-import shlex
 import wave
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from places import REPOSITORY, SHIPPED_POLICY
+from places import SHIPPED_POLICY
 
 from mute.acoustics.microphone import Microphone
-from mute.command_lines import calibrate as calibration
 from mute.command_lines import evaluate, evaluate_noise, sound_options
 from mute.command_lines import evaluate_walk as walk
 from mute.command_lines.arguments import make_directory
@@ -271,33 +268,3 @@ def test_a_policy_that_acts_between_physics_steps_is_told_in_one_line(monkeypatc
     monkeypatch.setattr(sound_options, "load_policy", lambda _: odd)
     with pytest.raises(MuteError, match=r"odd\.pt cannot be heard: .* multiple of 0\.001 s"):
         sound_options.load_audible_policy(Path("odd.pt"))
-
-
-# -- calibration -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        (["--seed", "-1"], "--seed"),
-        (["--seed", "2147483648"], "--seed"),
-        (["--seconds", "inf"], "--seconds"),
-        (["--out", "resources"], "--out resources: must name a file"),
-    ],
-)
-def test_a_bad_argument_of_the_calibration_is_refused_in_one_line(arguments, word, monkeypatch):
-    monkeypatch.chdir(REPOSITORY)
-    with pytest.raises(MuteError, match=word):
-        calibration.main(arguments)
-
-
-def test_gains_say_by_which_command_and_policy_file_they_were_made():
-    args = calibration.CalibrationArgs(seconds=3.0, out=REPOSITORY / "some where" / "gains.json")
-    origin = calibration.provenance(args, load_policy(SHIPPED))
-    assert shlex.split(origin["command"]) == [
-        "python", "-m", "mute.acoustics.calibration", "--policy", "resources/go1/go1_mute.pt",
-        "--reference", "mute", "--speed", "0.5", "--trials", "5", "--seconds", "3", "--seed", "1",
-        "--out", "some where/gains.json",
-    ]  # fmt: skip
-    assert origin["policy"]["sha256"] == hashlib.sha256(SHIPPED.read_bytes()).hexdigest()
-    assert origin["commit"]

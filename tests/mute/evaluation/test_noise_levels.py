@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import re
 
 import pytest
 import torch
-from places import REPOSITORY, SHIPPED_POLICY
+from places import SHIPPED_POLICY
 from scipy import stats
 
 from mute.acoustics import listener
-from mute.acoustics.floors import FLOORS
 from mute.acoustics.gains import load_gains
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.soundscape import SOURCES
 from mute.acoustics.sources.fan import FAN_LEVEL
 from mute.acoustics.tally import HeardLevels
-from mute.command_lines import calibrate as calibration
-from mute.command_lines import card
-from mute.command_lines.calibrate import fit_gain
 from mute.controllers import load_policy
 from mute.evaluation import noise_levels as noise
 from mute.evaluation import noise_probe
@@ -132,20 +127,6 @@ def test_power_is_the_work_of_all_trials_over_their_time(monkeypatch):
     assert _row_of(monkeypatch, [half, _heard(60.0)] * 2).power == pytest.approx(20.0)
 
 
-def test_the_card_tells_levels_without_spread_and_how_many_trials_have_one(tmp_path, capsys):
-    for source in (REPOSITORY / "docs" / "noise").glob("*.json"):
-        (tmp_path / source.name).write_bytes(source.read_bytes())
-    path = tmp_path / "noise.json"
-    rows = json.loads(path.read_text())
-    rows[0] |= {"trials_heard": 1, "mnl_mean": 68.0, "mnl_std": None}
-    rows[1] |= {"trials_heard": 0, "mnl_mean": None, "mnl_std": None}
-    path.write_text(json.dumps(rows))
-    card.main(["--noise", str(path)])
-    shown = capsys.readouterr().out
-    assert "| wood | 0 | 68.0 (1 of 5 trials) |" in shown
-    assert "| wood | 1 | - |" in shown
-
-
 def test_a_probe_of_a_training_is_near_the_table_and_draws_no_random_number(rows):
     policy = load_policy(SHIPPED_POLICY)
     before = torch.get_rng_state()
@@ -204,59 +185,3 @@ def test_the_cost_of_transport_is_power_over_weight_and_speed(rows):
         assert row.cost_of_transport == pytest.approx(
             row.power / (125.0 * row.speed_mean), rel=0.01
         )
-
-
-def test_the_gain_is_the_one_that_reaches_the_target():
-    assert fit_gain(lambda gain: 60.0 + 20.0 * math.log10(gain), 66.0206) == pytest.approx(
-        2.0, rel=1e-3
-    )
-
-
-def test_a_level_that_other_sources_exceed_cannot_be_fitted():
-    with pytest.raises(ValueError, match="no gain gives 50 dB"):
-        fit_gain(lambda gain: 10.0 * math.log10(10.0**5.5 + gain**2), 50.0)
-
-
-def test_the_shipped_calibration_has_every_floor_and_where_it_comes_from():
-    content = json.loads((REPOSITORY / "resources/acoustics/calibration.json").read_text())
-    assert load_gains().keys() == FLOORS.keys() == content["floors"].keys()
-    for floor in content["floors"].values():
-        assert floor["source"]
-        if "target_mnl" in floor:
-            assert floor["mnl"] == pytest.approx(floor["target_mnl"], abs=0.02)
-    assert content["command"].startswith("python -m mute.acoustics.calibration ")
-
-
-def test_a_calibration_reaches_the_papers_levels_and_is_near_the_one_that_ships(tmp_path):
-    out = tmp_path / "gains.json"
-    assert calibration.main(["--trials", "1", "--seconds", "2", "--out", str(out)]) == 0
-    content, shipped = json.loads(out.read_text()), load_gains()
-    for name, (mnl, _) in PAPER_LEVELS["mute beta 0"].items():
-        row = content["floors"][name]
-        assert row["target_mnl"] == mnl == pytest.approx(row["mnl"], abs=0.02)
-        assert row["mnl"] < row["pnl"] < row["mnl"] + 8.0
-    for name, gain in load_gains(out).items():  # one robot for 2 s is not five for 10 s
-        assert 20.0 * math.log10(gain / shipped[name]) == pytest.approx(0.0, abs=1.0)
-    assert "--trials 1 --seconds 2 " in content["command"]
-    assert content["policy"]["iteration"] == 400
-
-
-@pytest.mark.parametrize(
-    ("content", "word"),
-    [
-        ("", "no calibration"),
-        ("{}", "'floors' is missing"),
-        ('{"floors": {"wood": {"gain": 1}}}', "'carpet' is missing"),
-        (
-            json.dumps({"floors": {key: {"gain": -1.0} for key in FLOORS}}),
-            "wood must be a number > 0",
-        ),
-    ],
-)
-def test_a_broken_calibration_is_refused_in_one_line(content, word, tmp_path):
-    path = tmp_path / "calibration.json"
-    path.write_text(content)
-    with pytest.raises(MuteError, match=word) as caught:
-        load_gains(path)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
