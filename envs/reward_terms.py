@@ -7,7 +7,6 @@ them a task uses, how much each weighs and what scales it is `rewards`' business
 from __future__ import annotations
 
 import inspect
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -28,8 +27,9 @@ Group = Literal["task", "phase", "other", "lift", "guide"]
 Function = Callable[..., torch.Tensor]
 
 
-_FINITE = Range(-math.inf, above=True)
-_POSITIVE = Range(0.0, above=True)
+_ANY = Range(-1e9, 1e9)
+_POSITIVE = Range(1e-6, 1e9)
+"""Nothing that single precision would make zero or infinite of."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ class Parameter:
     """Its value unless a task says otherwise."""
     text: str
     """What it is, with its unit."""
-    allowed: Range = _FINITE
-    """What it may be; every finite number by default."""
+    allowed: Range = _ANY
+    """What it may be; every number up to 1e9, of either sign, by default."""
 
 
 @dataclass(frozen=True)
@@ -81,29 +81,52 @@ def register_term(
         parameters: What it takes by name beside the motion.
 
     Raises:
-        ValueError: Of the decorator, if the name is taken or none of Python's, the group unknown,
-            a default out of its range, or the function takes something else.
+        ValueError: If the group is unknown. Of the decorator, if the name is taken or none of
+            Python's, a default out of its range, or the function takes something else.
     """
+    if group not in get_args(Group):
+        allowed = ", ".join(get_args(Group))
+        raise ValueError(f"register_term: group must be one of {allowed}, got {group!r}")
 
     def register(function: Function) -> Function:
-        name = function.__name__
-        if name in _functions or not name.isidentifier():
-            reason = "is registered already" if name in _functions else "has no name of its own"
+        name = getattr(function, "__name__", type(function).__name__)
+        if name in _functions or not inspect.isfunction(function) or not name.isidentifier():
+            taken = name in _functions
+            reason = "is registered already" if taken else "is no function with a name of its own"
             raise ValueError(f"the reward function {name!r} {reason}; give it another name")
-        if group not in get_args(Group):
-            allowed = ", ".join(get_args(Group))
-            raise ValueError(f"{name}: group must be one of {allowed}, got {group!r}")
-        taken = list(inspect.signature(function).parameters)[1:]
-        if taken != list(parameters):
-            raise ValueError(
-                f"{name} takes {taken} beside the motion, and is registered with {list(parameters)}"
-            )
-        for parameter_name, parameter in parameters.items():
-            check_number(f"{name}.{parameter_name}", parameter.default, parameter.allowed)
+        _check_parameters(name, function, parameters)
         _functions[name] = RewardFunction(function, group, MappingProxyType(parameters))
         return function
 
     return register
+
+
+def _check_parameters(name: str, function: Function, parameters: Mapping[str, Parameter]) -> None:
+    """Refuse parameters that the function does not take by name beside the motion."""
+    signature = inspect.signature(function)
+    taken = list(signature.parameters)[1:]
+    try:
+        signature.bind(None, **dict.fromkeys(parameters))
+    except TypeError:
+        fits = False
+    else:
+        fits = taken == list(parameters)
+    if not fits:
+        raise ValueError(
+            f"{name} must take the motion and then its parameters by name, got "
+            f"{name}{signature} registered with {list(parameters)}"
+        )
+    for parameter_name, parameter in parameters.items():
+        place = f"{name}.{parameter_name}"
+        if parameter_name in _RESERVED:
+            raise ValueError(f"{place} must have another name: a term has a {parameter_name}")
+        if not isinstance(parameter, Parameter):
+            raise ValueError(f"{place} must be a Parameter, got {parameter!r}")
+        check_number(place, parameter.default, parameter.allowed)
+
+
+_RESERVED = ("function", "weight", "group")
+"""What `rewards.reward_term` takes beside a function's parameters."""
 
 
 _SHARPNESS = "inverse of the squared error at which 1/e of it is left"

@@ -6,14 +6,14 @@ come and go while it learns.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import torch
 
-from mute.support.ranges import check_number
+from mute.support.errors import MuteError
+from mute.support.ranges import Range, check_number, check_ordered, check_ranges
 
 from .motion import Motion
 from .reward_terms import REWARD_FUNCTIONS, Group
@@ -100,15 +100,8 @@ class RewardsCfg:
             raise ValueError(
                 f"env.rewards.phase_source must be 'estimated' or 'true', got {self.phase_source!r}"
             )
-        if not 0.0 <= self.k <= 1.0:
-            raise ValueError(f"env.rewards.k must be in [0, 1], got {self.k}")
-        for name in ("quiet_ramp", "lift_ramp", "guide_ramp"):
-            start, end = getattr(self, name)
-            if not 0.0 <= start <= end < math.inf:
-                raise ValueError(
-                    f"env.rewards.{name} must be (start, end) with 0 <= start <= end, both finite, "
-                    f"got {(start, end)}"
-                )
+        check_ranges(self, "env.rewards", _RANGES)
+        check_ordered(self, "env.rewards", "quiet_ramp", "lift_ramp", "guide_ramp")
         for name, term in self.terms.items():
             if not name.isidentifier():
                 raise ValueError(f"env.rewards.terms must have names as Python has, got {name!r}")
@@ -120,12 +113,16 @@ class RewardsCfg:
                 )
 
 
+_RAMP = Range(0.0, 1e12)
+_RANGES = {"k": Range(0.0, 1.0), "quiet_ramp": _RAMP, "lift_ramp": _RAMP, "guide_ramp": _RAMP}
+_WEIGHT = Range(-1e9, 1e9)
+
+
 def _complete(place: str, term: RewardTermCfg) -> None:
     """Fill in the parameters that a term leaves out, and check it."""
     if term.function not in REWARD_FUNCTIONS:
         raise ValueError(_unknown(f"{place}.function", term.function))
-    if not math.isfinite(term.weight):
-        raise ValueError(f"{place}.weight must be finite, got {term.weight}")
+    check_number(f"{place}.weight", term.weight, _WEIGHT)
     if term.group not in get_args(Group):
         allowed = ", ".join(get_args(Group))
         raise ValueError(f"{place}.group must be one of {allowed}, got {term.group!r}")
@@ -145,6 +142,14 @@ def _unknown(place: str, function: str) -> str:
     return (
         f"{place} must be one of {', '.join(REWARD_FUNCTIONS)}, or registered by a module that "
         f"MUTE_PLUGINS names, got {function!r}"
+    )
+
+
+def _misshapen(name: str, function: str, value: object, row: torch.Tensor) -> str:
+    given = f"shape {tuple(value.shape)}" if isinstance(value, torch.Tensor) else repr(value)
+    return (
+        f"env.rewards.terms.{name}: the function {function} must return one number a robot, shape "
+        f"{tuple(row.shape)}, got {given}"
     )
 
 
@@ -195,9 +200,16 @@ class RewardSum:
         Returns:
             The reward, shape (num_envs,), and by name each term's mean over the environments with
             its weight and group factor, per second, as scalars.
+
+        Raises:
+            MuteError: If a function returns something else than a number for every robot.
         """
-        for row, term in zip(self._values, self._terms, strict=True):
-            row.copy_(term(motion))
+        for name, row, term in zip(self.names, self._values, self._terms, strict=True):
+            value = term(motion)
+            # Another shape might fit by repetition: the sum over all robots would be paid to each.
+            if getattr(value, "shape", None) != row.shape:
+                raise MuteError(_misshapen(name, self.cfg.terms[name].function, value, row))
+            row.copy_(value)
         weighted = self._values.mul_(self._weights)
         beta = motion.command[:, 3]
         weighted[self._rows["task"]] *= 1.0 - self.cfg.k * beta

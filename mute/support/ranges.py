@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
 
 __all__ = ["Range", "check_number", "check_ordered", "check_ranges"]
 
@@ -23,8 +24,10 @@ class Range:
     """Whether it must be an integer."""
 
     def holds(self, value: float) -> bool:
-        """Tell whether a number lies within."""
-        if self.whole and (not isinstance(value, int) or isinstance(value, bool)):
+        """Tell whether a number lies within; what is none does not."""
+        if not isinstance(value, Real) or isinstance(value, bool):
+            return False
+        if self.whole and not isinstance(value, int):
             return False
         inside = self.low < value if self.above else self.low <= value
         return inside and value <= self.high and value < math.inf
@@ -77,9 +80,9 @@ def check_ordered(cfg: object, place: str, *names: str) -> None:
     """
     for name in names:
         value = getattr(cfg, name)
-        if len(value) != 2 or value[0] > value[1]:
+        if not isinstance(value, tuple | list) or len(value) != 2 or value[0] > value[1]:
             raise ValueError(f"{place}.{name} must be (low, high) with low <= high, got {value}")
 
 
 def _digits(value: float) -> str:
-    return str(int(value)) if value == int(value) else str(value)
+    return str(int(value)) if math.isfinite(value) and value == int(value) else str(value)

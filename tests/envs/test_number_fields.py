@@ -11,14 +11,17 @@ import pytest
 from number_fields import number_fields
 
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.reward_terms import REWARD_FUNCTIONS
+from mute.envs.rewards import RewardsCfg, reward_term
 from mute.envs.scene import FloorPatch, SceneCfg
 
 CFG = QuadrupedEnvCfg(
-    scene=SceneCfg(floor_patches=(FloorPatch((0.0, 0.0), (1.0, 1.0), 0.8, (0.02, 1.0)),))
+    scene=SceneCfg(floor_patches=(FloorPatch((0.0, 0.0), (1.0, 1.0), 0.8, (0.02, 1.0)),)),
+    rewards=RewardsCfg(
+        terms={name: reward_term(name, 1.0) for name in REWARD_FUNCTIONS}, guide_ramp=(0.0, 1.0)
+    ),
 )
-REWARDS = "env.rewards."
-"""Whose numbers are left to the tests of the rewards."""
-NUMBERS = [number for number in number_fields(CFG, "env") if not number[0].startswith(REWARDS)]
+NUMBERS = list(number_fields(CFG, "env"))
 
 
 def _places(cls: type, place: str) -> set[str]:
@@ -35,11 +38,12 @@ def _places(cls: type, place: str) -> set[str]:
 def test_every_field_that_can_hold_numbers_is_walked():
     walked = {place for place, _ in NUMBERS}
     for place in _places(QuadrupedEnvCfg, "env"):
-        assert place.startswith(REWARDS) or any(
-            each == place or each.startswith(f"{place}.") for each in walked
-        ), place
+        assert any(each == place or each.startswith(f"{place}.") for each in walked), place
     assert {"env.scene.timestep", "env.scene.floor_patches.rgba", "env.commands.beta"} <= walked
-    assert "env.observations.noise.joint_vel" in walked
+    assert {"env.observations.noise.joint_vel", "env.rewards.guide_ramp"} <= walked
+    for name, function in REWARD_FUNCTIONS.items():
+        assert f"env.rewards.terms.{name}.weight" in walked
+        assert {f"env.rewards.terms.{name}.params.{key}" for key in function.parameters} <= walked
 
 
 @pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])

@@ -172,6 +172,18 @@ def _stranger(motion: Motion, scale: float) -> torch.Tensor:
     return motion.base_height * scale
 
 
+def _lonely() -> float:
+    return 1.0
+
+
+def _collecting(motion: Motion, *scale: float) -> torch.Tensor:
+    return motion.base_height * scale[0]
+
+
+def _heavy(motion: Motion, weight: float) -> torch.Tensor:
+    return motion.base_height * weight
+
+
 def _fall() -> object:
     def fall(motion: Motion) -> torch.Tensor:
         return motion.base_height
@@ -185,7 +197,14 @@ def _fall() -> object:
         (_fall(), "other", {}, ["'fall'", "already"]),
         (lambda motion: motion.base_height, "other", {}, ["<lambda>", "name"]),
         (_stranger, "loud", {"scale": Parameter(1.0, "")}, ["group", "'loud'", "guide"]),
-        (_stranger, "other", {}, ["_stranger", "['scale']", "[]"]),
+        (3, "other", {}, ["'int'", "no function"]),
+        (lambda: 1.0, "other", {}, ["<lambda>"]),
+        (_lonely, "other", {}, ["_lonely", "the motion"]),
+        (_collecting, "other", {"scale": Parameter(1.0, "")}, ["_collecting", "by name"]),
+        (_stranger, "other", {"scale": 1.0}, ["_stranger.scale", "Parameter", "1.0"]),
+        (_stranger, "other", {"scale": Parameter(math.nan, "")}, ["_stranger.scale", "nan"]),
+        (_heavy, "other", {"weight": Parameter(1.0, "")}, ["_heavy.weight", "another name"]),
+        (_stranger, "other", {}, ["_stranger", "scale", "[]"]),
         (
             _stranger,
             "other",
@@ -193,7 +212,10 @@ def _fall() -> object:
             ["_stranger.scale", "> 0"],
         ),
     ],
-    ids=["taken", "nameless", "group", "signature", "default"],
+    ids=[
+        *("taken", "nameless", "group", "number", "lambda", "without motion", "collecting"),
+        *("no parameter", "nan", "reserved", "signature", "default"),
+    ],
 )
 @pytest.mark.usefixtures("_registry")
 def test_what_cannot_be_registered_is_refused_in_one_line(function, group, parameters, words):

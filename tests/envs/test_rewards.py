@@ -8,7 +8,10 @@ import pytest
 import torch
 from motion_helpers import make_motion
 
+from mute.envs import reward_terms
+from mute.envs.reward_terms import RewardFunction
 from mute.envs.rewards import RewardsCfg, RewardSum, RewardTermCfg, reward_term
+from mute.support.errors import MuteError
 
 STEP_DT = 0.02
 
@@ -161,15 +164,19 @@ def test_a_bad_constant_is_refused_by_name(field, value):
 @pytest.mark.parametrize(
     ("term", "words"),
     [
-        (RewardTermCfg("base_height", math.nan, "other"), ["x.weight", "finite", "nan"]),
-        (RewardTermCfg("base_height", -math.inf, "other"), ["x.weight", "finite", "-inf"]),
+        (RewardTermCfg("base_height", math.nan, "other"), ["x.weight", "<= 1000000000", "nan"]),
+        (RewardTermCfg("base_height", -math.inf, "other"), ["x.weight", ">= -1000000000", "-inf"]),
         (RewardTermCfg("base_hight", 1.0, "other"), ["x.function", "base_height", "'base_hight'"]),
         (RewardTermCfg("base_height", 1.0, "loud"), ["x.group", "phase", "'loud'"]),  # pyright: ignore[reportArgumentType]
-        (reward_term("base_height", 1.0, desired=0.0), ["x.params.desired", "> 0", "0.0"]),
-        (reward_term("touchdown_apex", 1.0, target=math.inf), ["x.params.target", "finite"]),
-        (reward_term("foot_clearance", 1.0, target=-0.1), ["x.params.target", "> 0", "-0.1"]),
+        (reward_term("base_height", 1.0, desired=0.0), ["x.params.desired", ">= 1e-06", "0.0"]),
+        (
+            reward_term("touchdown_apex", 1.0, target=math.inf),
+            ["x.params.target", "<= 1000000000", "inf"],
+        ),
+        (reward_term("foot_clearance", 1.0, target=-0.1), ["x.params.target", ">= 1e-06", "-0.1"]),
         (reward_term("base_height", 1.0, hight=1.0), ["x.params", "of desired", "'hight'"]),
         (reward_term("fall", 1.0, hight=1.0), ["x.params", "empty", "'hight'"]),
+        (reward_term("base_height", "1"), ["x.weight", "got 1"]),  # pyright: ignore[reportArgumentType]
         (reward_term("diagonal_support", 0.7), ["rewards.guide_ramp", "x.weight", "0.7"]),
     ],
 )
@@ -179,6 +186,26 @@ def test_a_bad_term_is_refused_by_its_place_with_what_is_allowed(term, words):
     message = str(caught.value)
     assert "\n" not in message
     assert all(word in message for word in words), message
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (torch.tensor(1.0), ["(2,)", "shape ()"]),
+        (torch.ones(2, 12), ["(2,)", "shape (2, 12)"]),
+        (torch.ones(2, 1), ["(2,)", "shape (2, 1)"]),
+        (1.0, ["(2,)", "got 1.0"]),
+    ],
+)
+def test_a_function_that_returns_no_number_for_each_robot_is_refused(value, words, monkeypatch):
+    known = RewardFunction(lambda motion: value, "other", {})
+    monkeypatch.setattr(reward_terms, "_functions", reward_terms._functions)
+    monkeypatch.setitem(reward_terms._functions, "odd", known)
+    reward_sum = _make_sum(RewardsCfg(terms={"mine": reward_term("odd", 1.0)}))
+    with pytest.raises(MuteError) as caught:
+        reward_sum(make_motion(base_height=[0.3, 0.3]), 1.0, 1.0, 1.0)
+    message = str(caught.value)
+    assert all(word in message for word in ["env.rewards.terms.mine", "odd", *words]), message
 
 
 def test_a_term_whose_name_could_be_no_option_is_refused():

@@ -26,7 +26,13 @@ def number_fields(cfg: Any, place: str) -> Iterator[tuple[str, Replace]]:
 
 def _numbers(value: Any, place: str, replace: Replace) -> Iterator[tuple[str, Replace]]:
     if dataclasses.is_dataclass(value):
-        yield from number_fields(value, place)
+        # What holds the dataclass is made anew as well: not every one checks itself.
+        for name, replace_within in number_fields(value, place):
+
+            def replace_field(new: Any, within: Replace = replace_within) -> object:
+                return replace(within(new))
+
+            yield name, replace_field
     elif isinstance(value, tuple):
         for index, item in enumerate(value):
 
