@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 import re
 from collections.abc import Callable
+from typing import Any
 
 from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg
 from mute.envs.commands import CommandsCfg
@@ -93,11 +96,13 @@ def register_task(name: str, factory: Callable[[], TaskCfg]) -> None:
         factory: Returns a new configuration at each call.
 
     Raises:
-        MuteError: If there is such a task already, or the name is another.
+        MuteError: If there is such a task already, the name is another, or the factory no function.
     """
+    if not callable(factory):
+        raise MuteError(f"the task {name!r} must be made by a function, got {factory!r}")
     if name in _TASKS:
         raise MuteError(f"the task {name!r} is registered already; give it another name")
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_.-]*", name):
+    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_.-]*", name):
         raise MuteError(
             f"a task's name must be letters, digits, '_', '-' and '.', a letter first, got {name!r}"
         )
@@ -107,9 +112,37 @@ def register_task(name: str, factory: Callable[[], TaskCfg]) -> None:
 def make_task(name: str) -> TaskCfg:
     """Return a new configuration of a task.
 
+    What a factory has set since the configuration was made is checked, too.
+
     Raises:
-        MuteError: If there is no such task.
+        MuteError: If there is no such task, or its factory makes no configuration that can be.
     """
     if name not in _TASKS:
         raise MuteError(f"--task must be one of {', '.join(_TASKS)}, got {name!r}")
-    return _TASKS[name]()
+    try:
+        cfg = _TASKS[name]()
+        if not isinstance(cfg, TaskCfg):
+            raise ValueError(f"its function must return a TaskCfg, got {cfg!r}")
+        return _remade(cfg, "")
+    except ValueError as error:
+        raise MuteError(f"the task {name!r} cannot be made: {error}") from error
+
+
+def _remade(cfg: Any, place: str) -> Any:  # noqa: ANN401
+    """Return a copy of a dataclass, and of those within, that has gone through every check.
+
+    Raises:
+        ValueError: If a field is out of its range, or what was set is none.
+    """
+    names = [field.name for field in dataclasses.fields(cfg)]
+    for name in vars(cfg):
+        if name not in names:
+            raise ValueError(f"{place}{name} was set, but there is no such field")
+    values = {name: getattr(cfg, name) for name in names}
+    parts = {
+        name: _remade(value, f"{place}{name}.")
+        if dataclasses.is_dataclass(value)
+        else copy.deepcopy(value)
+        for name, value in values.items()
+    }
+    return dataclasses.replace(cfg, **parts)

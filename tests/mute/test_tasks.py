@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 import pytest
 
 from mute import tasks
 from mute.config import TaskCfg
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.support.errors import MuteError
 from mute.tasks import DEFAULT_TASK, make_task, register_task, task_names
 
@@ -90,7 +94,56 @@ def test_a_task_is_registered_but_once():
     assert make_task("go1_mute") != TaskCfg()
 
 
-@pytest.mark.parametrize("name", ["", "a:b", "../up", "a b", "2fast", "a/b", "--task"])
+@pytest.mark.usefixtures("_registry")
+def test_a_task_that_no_function_makes_is_refused():
+    with pytest.raises(MuteError, match="'walk' must be made by a function, got 3"):
+        register_task("walk", 3)  # pyright: ignore[reportArgumentType]
+
+
+def _changed(change: Callable[[TaskCfg], object]) -> Callable[[], TaskCfg]:
+    def factory() -> TaskCfg:
+        cfg = TaskCfg()
+        change(cfg)
+        return cfg
+
+    return factory
+
+
+@pytest.mark.parametrize(
+    ("factory", "words"),
+    [
+        (lambda: None, ["TaskCfg", "None"]),
+        (lambda: TaskCfg(env=QuadrupedEnvCfg(num_envs=0)), ["env.num_envs", ">= 1"]),
+        (
+            _changed(lambda cfg: setattr(cfg.env.commands, "lin_vel_x", (math.inf, 1.0))),
+            ["env.commands.lin_vel_x", "inf"],
+        ),
+        (
+            _changed(lambda cfg: setattr(cfg.env.rewards.terms["base_height"], "weight", math.nan)),
+            ["env.rewards.terms.base_height.weight", "nan"],
+        ),
+        (_changed(lambda cfg: setattr(cfg.env, "num_env", 4)), ["env.num_env", "no such field"]),
+    ],
+)
+@pytest.mark.usefixtures("_registry")
+def test_what_a_function_makes_is_checked_and_refused_in_one_line(factory, words):
+    register_task("walk", factory)
+    with pytest.raises(MuteError) as caught:
+        make_task("walk")
+    message = str(caught.value)
+    assert "\n" not in message
+    assert all(word in message for word in ["'walk'", *words]), message
+
+
+@pytest.mark.usefixtures("_registry")
+def test_a_function_that_returns_one_configuration_again_and_again_does_not_share_it():
+    shared = TaskCfg()
+    register_task("walk", lambda: shared)
+    make_task("walk").env.rewards.terms["base_height"].weight = 99.0
+    assert make_task("walk") == TaskCfg()
+
+
+@pytest.mark.parametrize("name", ["", "a:b", "../up", "a b", "2fast", "a/b", "--task", None])
 @pytest.mark.usefixtures("_registry")
 def test_a_name_that_could_be_no_directory_or_option_is_refused(name):
     with pytest.raises(MuteError, match="a task's name must be"):
