@@ -10,6 +10,7 @@ from dataclasses import asdict
 from typing import Any
 
 from mute.envs.rewards import RewardTermCfg, paper_terms, reward_term
+from mute.envs.terrain import HeightMapCfg
 
 __all__ = ["MOVED", "check_resumable", "earlier_terms", "upgraded"]
 
@@ -81,6 +82,7 @@ def upgraded(data: dict[str, Any]) -> dict[str, Any]:
         _move(data, old.split("."), new.split("."))
     if rewards is not None and flat:
         rewards["terms"] = _filled(rewards["terms"])
+        _give_extent_that_was(data)
     return data
 
 
@@ -111,6 +113,18 @@ def _filled(given: dict[str, Any]) -> dict[str, Any]:
         if plain["weight"] != 0.0:
             terms[name] = plain
     return terms
+
+
+def _give_extent_that_was(data: dict[str, Any]) -> None:
+    """Ask for the height map that earlier versions made: an odd number of points each way."""
+    grid = _mapping(data, ["env", "height_map"]) or {}
+    spacing = grid.get("spacing", HeightMapCfg().spacing)
+    for name in ("length", "width"):
+        extent = grid.get(name)
+        if isinstance(extent, int | float) and isinstance(spacing, int | float) and spacing > 0.0:
+            half = round(extent / spacing / 2)
+            if round(extent / spacing, 6) != 2 * half:  # else it is what was asked for
+                grid[name] = 2 * half * spacing
 
 
 def _holds(rewards: dict[str, Any], paths: dict[str, str]) -> bool:

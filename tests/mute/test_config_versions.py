@@ -50,6 +50,20 @@ def test_a_constant_of_all_rewards_becomes_a_parameter_of_its_term():
     assert terms["touchdown_apex"] == reward_term("touchdown_apex", -2.0, target=0.03)
 
 
+@pytest.mark.parametrize(
+    ("asked", "was", "points"), [(0.45, 0.6, 5), (0.6, 0.6, 5), (0.95, 0.9, 7), (0.1, 0.0, 1)]
+)
+def test_a_height_map_keeps_the_odd_number_of_points_that_was_made_of_its_extent(
+    asked, was, points
+):
+    data = _with_flat_rewards()
+    data["env"]["height_map"]["width"] = asked
+    height_map = from_plain(data).env.height_map
+    assert height_map.width == pytest.approx(was)
+    assert len(height_map.grid()[:, 1].unique()) == points
+    assert height_map.length == 0.9
+
+
 def test_a_term_without_weight_is_gone_and_one_that_is_not_given_has_the_papers():
     rewards = {"lin_vel_z": 0.0, "smoothness": -0.01, "tilt": -2.0, "k": 0.3}
     cfg = from_plain({"env": {"rewards": rewards}}).env.rewards
