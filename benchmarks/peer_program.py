@@ -89,10 +89,13 @@ def _gymnasium(_num_envs: int, task: str) -> Peer:
     sys.path.insert(0, str(Path(__file__).parent))  # -P leaves it out
     from bare_go1 import BareGo1
 
+    from mute.command_lines.arguments import task_name
+    from mute.support.plugins import load_plugins
     from mute.support.threads import usable_cores
     from mute.tasks import make_task
 
-    cfg = make_task(task).env
+    load_plugins()
+    cfg = make_task(task_name(task)).env
     robots = _WORKERS_PER_CORE * usable_cores()
     env = AsyncVectorEnv([lambda: BareGo1(cfg)] * robots)
     env.reset(seed=0)

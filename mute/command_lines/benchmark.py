@@ -33,6 +33,7 @@ from mute.command_lines.arguments import (
     check_option,
     command_line,
     parse,
+    task_name,
 )
 from mute.command_lines.benchmark_peers import peer_names, time_peer
 from mute.envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
@@ -58,7 +59,7 @@ class BenchmarkArgs:
     """Arguments of the benchmark."""
 
     task: str = DEFAULT_TASK
-    """Task to measure."""
+    """Task to measure; `module:task` imports a module of yours first, which registers it."""
     num_envs: tuple[int, ...] = (256, 1024, 4096, 8192, 16384)
     """Numbers of environments."""
     rollouts: int = 5
@@ -164,7 +165,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     argv = command_line() if argv is None else list(argv)
     args = parse(BenchmarkArgs, argv, "Measure the speed of training, part by part.")
-    make_task(args.task)
+    task = task_name(args.task)
+    make_task(task)
     peers = peer_names(args.peers)
     check_distinct("num-envs", args.num_envs)
     for num_envs in args.num_envs:
@@ -173,7 +175,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     sizes = args.num_envs if args.json else track(args.num_envs, "environments")
     rows = [_rates_apart(args.task, num_envs, args.rollouts) for num_envs in sizes]
     peer_rows = _peer_rows(args, peers)
-    content = {"task": args.task, "machine": machine_kind(), "rates": rows, "peers": peer_rows}
+    content = {"task": task, "machine": machine_kind(), "rates": rows, "peers": peer_rows}
     if args.out is not None:
         write_json(args.out, content)
     if args.json:
@@ -204,7 +206,7 @@ def _measure_as_trained(task: str, num_envs: int, rollouts: int) -> Rates:
     """Return the rates in a process whose memory is kept as in that of a training."""
     keep_freed_memory()
     load_plugins()
-    return measure(task, num_envs, rollouts)
+    return measure(task_name(task), num_envs, rollouts)
 
 
 def _median_ratio(engine: Sequence[float], part: Sequence[float]) -> float:

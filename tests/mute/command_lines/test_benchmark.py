@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import sys
 import venv
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import torch
 from bare_go1 import BareGo1
 from mjbatch import Batch
 
+from mute import tasks
 from mute.command_lines import benchmark
 from mute.command_lines.benchmark_peers import PeerRate, peer_names, time_peer
 from mute.envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
@@ -53,6 +55,30 @@ def test_the_benchmark_prints_the_rates_of_every_part_as_json(capsys):
         "steps_per_second": None,
         "note": "/nowhere/python does not start: No such file or directory",
     }
+
+
+@pytest.fixture
+def _own_task(tmp_path, monkeypatch):
+    """Work in a folder with a module that registers a task, and forget both afterwards."""
+    (tmp_path / "mute_own_walk.py").write_text(
+        "from mute.tasks import make_task, register_task\n"
+        "register_task('own_walk', lambda: make_task('go1_mute'))\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.setattr(tasks, "_TASKS", dict(tasks._TASKS))
+    yield
+    sys.modules.pop("mute_own_walk", None)
+
+
+@pytest.mark.usefixtures("_own_task")
+def test_a_task_of_a_users_own_module_is_measured_in_every_process(capsys):
+    argv = ["--task", "mute_own_walk:own_walk", "--num-envs", "4", "--rollouts", "1", "--json"]
+    assert benchmark.main([*argv, "--peers", "gymnasium"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["task"] == "own_walk"
+    assert content["rates"][0]["loop"] > 0.0
+    assert content["peers"][0]["steps_per_second"] > 0.0
 
 
 def test_engine_and_environment_do_again_what_the_training_did():
