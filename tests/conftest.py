@@ -17,6 +17,13 @@ import pytest
 _MOST_WORKERS = 8
 """Processes of `-n auto` at most: each holds a torch of its own, and starts more."""
 
+_LONGEST = (
+    *("test_video.py", "test_distributed.py", "test_engines.py", "test_filmed_evaluations.py"),
+    *("test_resume.py", "test_lost_work.py", "test_programs.py", "test_runner.py"),
+    *("test_benchmark.py", "test_sound_benchmark.py", "test_gym_making.py"),
+)
+"""Files that take longest. They come first, so that no process is alone with one at the end."""
+
 _NOT_OURS = (
     *("CLICOLOR", "CLICOLOR_FORCE", "FORCE_COLOR", "NO_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"),
     *("DISPLAY", "WAYLAND_DISPLAY", "MPLBACKEND", "MUJOCO_GL", "PYOPENGL_PLATFORM"),
@@ -72,6 +79,12 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     if all(place.endswith(".py") for place in places):
         workers = min(workers, len(places))
     return workers if workers > 1 else 0
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the longest files first and leave the order as it is elsewhere."""
+    places = {name: place for place, name in enumerate(_LONGEST)}
+    items.sort(key=lambda item: places.get(item.path.name, len(places)))
 
 
 @pytest.fixture(autouse=True, scope="session")

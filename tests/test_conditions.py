@@ -55,3 +55,10 @@ def test_the_tests_above_pass_where_signals_are_ignored_and_variables_set():
     )
     assert run.returncode == 0, run.stdout + run.stderr
     assert "2 passed" in run.stdout
+
+
+def test_the_files_that_come_first_are_there(request):
+    conftest = REPOSITORY / "tests" / "conftest.py"
+    plugin = request.config.pluginmanager.get_plugin(str(conftest))
+    names = {path.name for path in conftest.parent.rglob("test_*.py")}
+    assert set(plugin._LONGEST) <= names

@@ -95,6 +95,19 @@ def test_what_follows_an_unstable_simulation_is_worth_the_value_of_the_observati
     torch.testing.assert_close(storage.rewards[:2, 1:3], alg.gamma * values)
 
 
+def test_an_update_learns_from_all_samples_but_those_over_as_its_help_says():
+    runner = make_runner(iterations=1)
+    storage = runner.alg.storage
+    storage.distribution_params = storage.distribution_params or ()
+    storage.returns.copy_(torch.arange(NUM_ENVS * NUM_STEPS).view_as(storage.returns))
+    for parts in (2, 5):
+        batches = storage.mini_batch_generator(parts, 1)
+        returns = [batch.returns for batch in batches if batch.returns is not None]
+        learnt = torch.cat(returns).flatten()
+        assert [len(batch) for batch in returns] == [NUM_ENVS * NUM_STEPS // parts] * parts
+        assert len(learnt.unique()) == len(learnt) > NUM_ENVS * NUM_STEPS - parts
+
+
 def test_the_first_ratio_of_every_update_is_one(monkeypatch):
     runner = make_runner(iterations=3)
     alg = runner.alg
