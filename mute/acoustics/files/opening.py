@@ -1,4 +1,4 @@
-"""KeptWalks opened for reading at any place, those that come through a pipe too."""
+"""Recordings opened for reading at any place, those that come through a pipe too."""
 
 from __future__ import annotations
 
