@@ -11,12 +11,17 @@ import torch
 
 from mute.support.ranges import Range, check_number
 
+from .randomization import PHYSICS_DIM
+from .scene import LEGS
+
 __all__ = [
     "OBSERVATION_WIDTHS",
     "OBS_DIM",
     "ObservationsCfg",
     "noise_amplitude",
     "policy_observation",
+    "privileged_observation",
+    "privileged_widths",
     "slices",
 ]
 
@@ -84,6 +89,17 @@ class ObservationsCfg:
         check_number("env.observations.noise_level", self.noise_level, Range(0.0, 1e6))
 
 
+def privileged_widths(num_heights: int) -> dict[str, int]:
+    """Return the parts of what the critic sees besides, in order."""
+    return {
+        "base_lin_vel": 3,
+        "heights": num_heights,
+        "contact": len(LEGS),
+        "phase": len(LEGS),
+        "physics": PHYSICS_DIM,
+    }
+
+
 def slices(widths: dict[str, int]) -> dict[str, slice]:
     """Return the columns of each part of a group laid out in order."""
     result, start = {}, 0
@@ -140,3 +156,25 @@ def policy_observation(
         ),
         dim=1,
     )
+
+
+def privileged_observation(
+    base_lin_vel: torch.Tensor,
+    heights: torch.Tensor,
+    contact: torch.Tensor,
+    phase: torch.Tensor,
+    physics: torch.Tensor,
+) -> torch.Tensor:
+    """Return what the critic sees besides, laid out as `privileged_widths`.
+
+    Args:
+        base_lin_vel: True velocity in the body frame, m/s. Shape: (num_envs, 3).
+        heights: Normalised height map. Shape: (num_envs, num_heights).
+        contact: Contact of each foot within the control step, bool. Shape: (num_envs, 4).
+        phase: Causal phase of each foot. Shape: (num_envs, 4).
+        physics: Randomised physics. Shape: (num_envs, PHYSICS_DIM).
+
+    Returns:
+        A new tensor. Shape: (num_envs, the sum of the widths).
+    """
+    return torch.cat((base_lin_vel, heights, contact.float(), phase, physics), dim=1)

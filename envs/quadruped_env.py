@@ -14,13 +14,21 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
+from .base_state import base_state
 from .commands import CommandSampler
 from .curriculum import Curriculum, curriculum
 from .engines import make_simulation
 from .footfall import Footfalls
-from .observations import OBS_DIM, noise_amplitude, policy_observation, slices
+from .initial_state import NUM_DRAWS, place
+from .observations import (
+    noise_amplitude,
+    policy_observation,
+    privileged_observation,
+    privileged_widths,
+    slices,
+)
 from .quadruped_env_cfg import QuadrupedEnvCfg
-from .randomization import PHYSICS_DIM, randomize_physics
+from .randomization import randomize_physics
 from .rewards import Motion, RewardSum
 from .scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS, build_scene
 from .sensors import RobotSensors
@@ -89,15 +97,7 @@ class QuadrupedEnv(VecEnv):
         self.reward_sum = RewardSum(cfg.rewards, cfg.step_dt, cfg.num_envs, self.device)
         self.stand = torch.tensor(STAND_JOINT_POS, device=self.device)
         """Joint positions of the stance, rad. Shape: (12,)."""
-        self.privileged_slices = slices(
-            {
-                "base_lin_vel": 3,
-                "heights": self.grid.shape[0],
-                "contact": len(LEGS),
-                "phase": len(LEGS),
-                "physics": PHYSICS_DIM,
-            }
-        )
+        self.privileged_slices = slices(privileged_widths(len(self.grid)))
         """Columns of each part of the group `privileged`."""
         self._noise = noise_amplitude(cfg.observations, self.device)
         self._allocate()
@@ -144,8 +144,7 @@ class QuadrupedEnv(VecEnv):
             self._reset(dones)
         self._resample_and_push(dones)
         self._observe()
-        extras = {"time_outs": time_outs, "log": log}
-        return self._observations, reward, dones, extras
+        return self._observations, reward, dones, {"time_outs": time_outs, "log": log}
 
     # -- what others may set or read -------------------------------------------------------------
 
@@ -190,7 +189,7 @@ class QuadrupedEnv(VecEnv):
         state["generator"] = self.generator.get_state()
         state["simulation"] = self.simulation.state_dict()
         state["footfalls"] = self.footfalls.state_dict()
-        state["observations"] = {key: self._observations[key].clone() for key in _GROUPS}
+        state["observations"] = {key: value.clone() for key, value in self._observations.items()}
         return state
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -247,26 +246,11 @@ class QuadrupedEnv(VecEnv):
 
     def _read_state(self) -> None:
         """Derive what rewards and observations share from the engine's state."""
-        qpos, qvel = self.simulation.qpos, self.simulation.qvel
-        w, x, y, z = qpos[:, 3:7].unbind(dim=1)
-        # Rows of the rotation matrix from body to world; columns are the world's axes seen by it.
-        rotation = torch.stack(
-            (
-                1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
-                2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
-                2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
-            ),
-            dim=1,
-        ).view(-1, 3, 3)  # fmt: skip
-        self.base_pos = qpos[:, :3]
-        self.base_lin_vel = (rotation.transpose(1, 2) @ qvel[:, :3, None]).squeeze(2)
-        # MuJoCo gives a free joint's angular velocity in the body frame already.
-        self.base_ang_vel = qvel[:, 3:6]
-        self.projected_gravity = -rotation[:, 2]
-        heading = rotation[:, :2, 0]
-        self.heading = heading / heading.norm(dim=1, keepdim=True).clamp(min=1e-6)
-        self.joint_pos = qpos[:, 7:] - self.stand
-        self.joint_vel = qvel[:, 6:]
+        base = base_state(self.simulation.qpos, self.simulation.qvel)
+        self.base_pos, self.base_lin_vel, self.base_ang_vel = base.pos, base.lin_vel, base.ang_vel
+        self.projected_gravity, self.heading = base.projected_gravity, base.heading
+        self.joint_pos = self.simulation.qpos[:, 7:] - self.stand
+        self.joint_vel = self.simulation.qvel[:, 6:]
 
     def _motion(self, phase: torch.Tensor) -> Motion:
         feet = self.footfalls
@@ -315,25 +299,13 @@ class QuadrupedEnv(VecEnv):
 
     def _reset(self, mask: torch.Tensor) -> None:
         """Begin new episodes for the masked robots; no other robot is touched."""
-        simulation, cfg = self.simulation, self.cfg
-        simulation.reset(mask, keyframe=self.model.key("stand").id)
-        draw = 2.0 * self._draw(self.num_envs, 19) - 1.0
-        column = mask.unsqueeze(1)
-        qpos, qvel = simulation.qpos, simulation.qvel
-        joint_pos = self.stand + cfg.initial_joint_noise * draw[:, :12]
-        qpos[:, 7:] = torch.where(column, joint_pos, qpos[:, 7:])
-        qvel[:, :6] = torch.where(column, cfg.initial_velocity * draw[:, 12:18], qvel[:, :6])
-        if cfg.random_heading:
-            half = 0.5 * math.pi * draw[:, 18]
-            zero = torch.zeros_like(half)
-            heading = torch.stack((half.cos(), zero, zero, half.sin()), dim=1)
-            qpos[:, 3:7] = torch.where(column, heading, qpos[:, 3:7])
-        simulation.ctrl[:] = torch.where(column, self.stand, simulation.ctrl)
+        self.simulation.reset(mask, keyframe=self.model.key("stand").id)
+        place(self.simulation, mask, self._draw(self.num_envs, NUM_DRAWS), self.stand, self.cfg)
         self._lift_to_ground(mask)
         self.commands.resample(mask, True, self.curriculum.commands)
         self.footfalls.reset(mask, self._sensors.foot_contact)
-        for name in ("action", "last_action", "action_before_last", "last_joint_vel"):
-            setattr(self, name, getattr(self, name).masked_fill(column, 0.0))
+        for name in _PAST:
+            setattr(self, name, getattr(self, name).masked_fill(mask.unsqueeze(1), 0.0))
         self.episode_length_buf = self.episode_length_buf.masked_fill(mask, 0)
         self._read_state()
 
@@ -345,21 +317,22 @@ class QuadrupedEnv(VecEnv):
         self.simulation.forward(mask)
 
     def _resample_and_push(self, dones: torch.Tensor) -> None:
-        age = self.episode_length_buf
-        interval = max(1, round(self.cfg.commands.resampling_time / self.step_dt))
-        due = (age % interval == 0) & ~dones & (age > 0)
+        due = self._due(self.cfg.commands.resampling_time) & ~dones
         if bool(due.any()):
             self.commands.resample(due, False, self.curriculum.commands)
         cfg = self.cfg.randomization
         if not (cfg.enabled and cfg.push_interval > 0.0):
             return
-        interval = max(1, round(cfg.push_interval / self.step_dt))
-        due = (age % interval == 0) & (age > 0)
+        due = self._due(cfg.push_interval)
         if bool(due.any()):
-            push = 2.0 * self._draw(self.num_envs, 2) - 1.0
-            push *= cfg.push_velocity * due.unsqueeze(1)
+            push = self._draw(self.num_envs, 2) * (cfg.push_velocity * due.unsqueeze(1))
             self.simulation.qvel[:, :2] += push
             self._read_state()  # the critic and the estimator's label know of the push
+
+    def _due(self, interval: float) -> torch.Tensor:
+        """Return in whose episode an interval (s) ends with this step. Shape: (num_envs,), bool."""
+        steps = max(1, round(interval / self.step_dt))
+        return (self.episode_length_buf % steps == 0) & (self.episode_length_buf > 0)
 
     def _observe(self) -> None:
         policy = policy_observation(
@@ -372,28 +345,19 @@ class QuadrupedEnv(VecEnv):
             self.commands.command,
         )
         if self.cfg.observations.noise_level > 0.0:
-            policy += self._noise * (2.0 * self._draw(*policy.shape) - 1.0)
+            policy += self._noise * self._draw(*policy.shape)
         heights = self.terrain.height_map(self.grid, self.base_pos, self.heading)
+        heights = self.cfg.height_map.normalised(heights)
         feet = self.footfalls
-        privileged = torch.cat(
-            (
-                self.base_lin_vel,
-                self.cfg.height_map.normalised(heights),
-                feet.raw_contact.float(),
-                feet.phase,
-                self.physics,
-            ),
-            dim=1,
+        privileged = privileged_observation(
+            self.base_lin_vel, heights, feet.raw_contact, feet.phase, self.physics
         )
         self._observations = TensorDict(
             {"policy": policy, "privileged": privileged}, batch_size=[self.num_envs]
         )
 
     def _log(
-        self,
-        shares: dict[str, torch.Tensor],
-        factors: Curriculum,
-        dones: torch.Tensor,
+        self, shares: dict[str, torch.Tensor], factors: Curriculum, dones: torch.Tensor
     ) -> dict[str, torch.Tensor]:
         return {
             **{f"Reward/{name}": share for name, share in shares.items()},
@@ -403,8 +367,8 @@ class QuadrupedEnv(VecEnv):
         }
 
     def _draw(self, *shape: int) -> torch.Tensor:
-        """Return random numbers in [0, 1)."""
-        return torch.rand(shape, generator=self.generator, device=self.device)
+        """Return random numbers in [-1, 1)."""
+        return 2.0 * torch.rand(shape, generator=self.generator, device=self.device) - 1.0
 
     def _everyone(self) -> torch.Tensor:
         """Return a mask of all robots. Shape: (num_envs,)."""
@@ -415,8 +379,7 @@ class QuadrupedEnv(VecEnv):
     def _allocate(self) -> None:
         num_envs, device = self.num_envs, self.device
         zeros = torch.zeros(num_envs, NUM_ACTIONS, device=device)
-        self.action, self.last_action, self.action_before_last = zeros, zeros, zeros
-        self.last_joint_vel = zeros
+        self.action = self.last_action = self.action_before_last = self.last_joint_vel = zeros
         self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long, device=device)
         nobody = torch.zeros(num_envs, dtype=torch.bool, device=device)
         self.fallen = nobody
@@ -432,14 +395,5 @@ class QuadrupedEnv(VecEnv):
         self._estimated_phase = torch.zeros(num_envs, len(LEGS), device=device)
 
 
-_STATE_TENSORS = (
-    "action",
-    "last_action",
-    "action_before_last",
-    "last_joint_vel",
-    "episode_length_buf",
-    "_estimated_phase",
-    "physics",
-)
-_GROUPS = ("policy", "privileged")
-assert OBS_DIM == 46
+_PAST = ("action", "last_action", "action_before_last", "last_joint_vel")
+_STATE_TENSORS = (*_PAST, "episode_length_buf", "_estimated_phase", "physics")

@@ -1,0 +1,52 @@
+"""Where the trunk is and how it moves, in the frames that rewards and observations ask for."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+
+__all__ = ["BaseState", "base_state"]
+
+
+class BaseState(NamedTuple):
+    """The trunk of every robot; positions and angular velocities are views of the engine's own."""
+
+    pos: torch.Tensor
+    """Position in the world, m. Shape: (num_envs, 3)."""
+    lin_vel: torch.Tensor
+    """Velocity in the body frame, m/s. Shape: (num_envs, 3)."""
+    ang_vel: torch.Tensor
+    """Angular velocity in the body frame, rad/s. Shape: (num_envs, 3)."""
+    projected_gravity: torch.Tensor
+    """Direction of gravity in the body frame. Shape: (num_envs, 3)."""
+    heading: torch.Tensor
+    """Unit vector of the trunk's x axis in the horizontal plane. Shape: (num_envs, 2)."""
+
+
+def base_state(qpos: torch.Tensor, qvel: torch.Tensor) -> BaseState:
+    """Return the trunk's state from that of the engine.
+
+    Args:
+        qpos: Generalised positions, those of the trunk's free joint first. Shape: (num_envs, nq).
+        qvel: Generalised velocities, likewise. Shape: (num_envs, nv).
+    """
+    w, x, y, z = qpos[:, 3:7].unbind(dim=1)
+    # Rows of the rotation matrix from body to world; columns are the world's axes seen by it.
+    rotation = torch.stack(
+        (
+            1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
+            2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
+            2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
+        ),
+        dim=1,
+    ).view(-1, 3, 3)  # fmt: skip
+    heading = rotation[:, :2, 0]
+    return BaseState(
+        pos=qpos[:, :3],
+        lin_vel=(rotation.transpose(1, 2) @ qvel[:, :3, None]).squeeze(2),
+        # MuJoCo gives a free joint's angular velocity in the body frame already.
+        ang_vel=qvel[:, 3:6],
+        projected_gravity=-rotation[:, 2],
+        heading=heading / heading.norm(dim=1, keepdim=True).clamp(min=1e-6),
+    )
