@@ -138,14 +138,20 @@ def test_curves_on_a_full_disk_are_told_in_one_line(tmp_path):
     writer.stop()
 
 
-@pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
 def test_what_tensorboards_thread_cannot_write_is_told_in_one_line(tmp_path, monkeypatch):
+    others, reported = threading.enumerate(), []
+    monkeypatch.setattr(threading, "excepthook", reported.append)
     writer = CurveWriter(str(tmp_path))
     monkeypatch.setattr(RecordWriter, "write", _full)
-    with pytest.raises(DiskError) as caught, quiet_writer_thread():
-        for iteration in range(100):  # told in the first or the second, as the threads run
-            writer.add_scalar("Loss/value", 0.5, iteration)
-            writer.end_iteration(iteration)
+    with quiet_writer_thread():
+        with pytest.raises(DiskError) as caught:
+            for iteration in range(100):  # told in the first or the second, as the threads run
+                writer.add_scalar("Loss/value", 0.5, iteration)
+                writer.end_iteration(iteration)
+        for thread in threading.enumerate():
+            if thread not in others:
+                thread.join(timeout=60)
+    assert reported == []  # its module has the name that is looked for
     assert str(caught.value) == (
         f"cannot write TensorBoard's curves in {tmp_path}: No space left on device"
     )
