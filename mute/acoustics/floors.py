@@ -30,8 +30,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import inf, log, pi
+from math import log, pi
 from types import MappingProxyType
+
+from mute.support.ranges import Range, check_number
 
 __all__ = [
     "FLOORS",
@@ -214,48 +216,59 @@ def register_floor(floor: Floor, gain: float | str) -> None:
     Raises:
         ValueError: If there is such a floor already, or a figure is out of its range.
     """
+    if not isinstance(floor, Floor):
+        raise ValueError(f"register_floor takes a Floor, got {floor!r}")
     if floor.name in FLOORS:
         raise ValueError(f"the floor {floor.name!r} is registered already; give it another name")
     _check(floor)
     if isinstance(gain, str):
         find_floors([gain])
         gain = OWN_GAINS.get(gain, gain)
-    elif not 0.0 < gain < inf:
-        raise ValueError(f"floor {floor.name}: gain must be > 0 and finite, got {gain}")
+    else:
+        check_number(f"floor {floor.name}: gain", gain, _POSITIVE)
     _floors[floor.name] = floor
     _own_gains[floor.name] = gain
 
 
 def _check(floor: Floor) -> None:
     """Refuse a floor that cannot be."""
-    if not re.fullmatch(r"[a-z][a-z0-9_-]*", floor.name):
+    if not isinstance(floor.name, str) or not re.fullmatch(r"[a-z][a-z0-9_-]*", floor.name):
         raise ValueError(
             "a floor's name must be small letters, digits, '_' and '-', a letter first, "
             f"got {floor.name!r}"
         )
     if not floor.modes:
         raise ValueError(f"floor {floor.name}: modes must hold at least one")
-    low, high = floor.scuff_band
-    figures = {
-        "friction": floor.friction,
-        "solref": min(floor.solref),
-        "stiffness": floor.stiffness,
-        "scuff_efficiency": floor.scuff_efficiency,
-        "scuff_band": low,
-    }
+    place = f"floor {floor.name}"
+    for name, length in (("solref", 2), ("scuff_band", 2), ("colour", 3)):
+        value = getattr(floor, name)
+        if not isinstance(value, tuple) or len(value) != length:
+            raise ValueError(f"{place}: {name} must be {length} numbers, got {value!r}")
     for number, mode in enumerate(floor.modes):
-        figures |= {f"modes[{number}].{name}": value for name, value in vars(mode).items()}
-    for name, value in figures.items():
-        if not 0.0 < value < inf:
-            raise ValueError(f"floor {floor.name}: {name} must be > 0 and finite, got {value}")
-    if not low < high < inf:
-        raise ValueError(f"floor {floor.name}: scuff_band must rise, got {floor.scuff_band}")
-    if not 0.0 <= floor.restitution < 1.0:
-        raise ValueError(
-            f"floor {floor.name}: restitution must be in [0, 1), got {floor.restitution}"
-        )
-    if not all(0.0 <= part <= 1.0 for part in floor.colour):
-        raise ValueError(f"floor {floor.name}: colour must be of 0 to 1, got {floor.colour}")
+        if not isinstance(mode, Mode):
+            raise ValueError(f"{place}: modes[{number}] must be a Mode, got {mode!r}")
+        for name, value in vars(mode).items():
+            check_number(f"{place}: modes[{number}].{name}", value, _POSITIVE)
+    for name, allowed in _RANGES.items():
+        value = getattr(floor, name)
+        for number in value if isinstance(value, tuple) else (value,):
+            check_number(f"{place}: {name}", number, allowed)
+    if not floor.scuff_band[0] < floor.scuff_band[1]:
+        raise ValueError(f"{place}: scuff_band must rise, got {floor.scuff_band}")
+    if floor.restitution == 1.0:
+        raise ValueError(f"{place}: restitution must be < 1, got 1.0")
+
+
+_POSITIVE = Range(0.0, above=True)
+_RANGES = {
+    "friction": Range(0.0, 10.0, above=True),
+    "solref": Range(0.0, 10.0, above=True),
+    "stiffness": _POSITIVE,
+    "restitution": Range(0.0, 1.0),
+    "scuff_band": _POSITIVE,
+    "scuff_efficiency": _POSITIVE,
+    "colour": Range(0.0, 1.0),
+}
 
 
 def find_floors(names: Iterable[str]) -> tuple[Floor, ...]:

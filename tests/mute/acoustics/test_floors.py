@@ -90,11 +90,21 @@ def test_a_registered_floor_is_found_and_has_the_gain_that_it_came_with():
         ({"name": "Cork Oak"}, 1.0, ["'Cork Oak'", "small letters"]),
         ({}, 0.0, ["cork", "gain", "> 0", "0.0"]),
         ({}, math.nan, ["cork", "gain", "> 0", "nan"]),
+        ({}, None, ["cork", "gain", "None"]),
+        ({"name": None}, 1.0, ["small letters", "None"]),
+        ({"friction": 1e30}, 1.0, ["cork", "friction", "<= 10", "1e+30"]),
+        ({"friction": "dry"}, 1.0, ["cork", "friction", "dry"]),
+        ({"solref": (0.02, 1.0, 1.0)}, 1.0, ["cork", "solref", "2 numbers"]),
+        ({"scuff_band": (100.0, math.nan)}, 1.0, ["cork", "scuff_band", "nan"]),
+        ({"scuff_band": (100.0,)}, 1.0, ["cork", "scuff_band", "2 numbers"]),
+        ({"colour": (0.5, 0.5)}, 1.0, ["cork", "colour", "3 numbers"]),
+        ({"restitution": math.nan}, 1.0, ["cork", "restitution", "nan"]),
+        ({"modes": ((100.0, 0.1, 1.0),)}, 1.0, ["cork", "modes[0]", "Mode"]),
         ({}, "oak", ["'oak'", "wood"]),
         ({"friction": 0.0}, 1.0, ["cork", "friction", "0.0"]),
         ({"solref": (0.02, -1.0)}, 1.0, ["cork", "solref", "-1.0"]),
         ({"stiffness": math.inf}, 1.0, ["cork", "stiffness", "inf"]),
-        ({"restitution": 1.0}, 1.0, ["cork", "restitution", "[0, 1)", "1.0"]),
+        ({"restitution": 1.0}, 1.0, ["cork", "restitution", "< 1", "1.0"]),
         ({"modes": ()}, 1.0, ["cork", "modes"]),
         ({"modes": (Mode(100.0, 0.0, 1.0),)}, 1.0, ["cork", "modes[0].decay_time", "0.0"]),
         ({"scuff_band": (500.0, 200.0)}, 1.0, ["cork", "scuff_band", "rise"]),
@@ -109,3 +119,9 @@ def test_a_floor_that_cannot_be_is_refused_by_the_field(changed, gain, words):
         register_floor(dataclasses.replace(CORK, **changed), gain)
     assert all(word in str(caught.value) for word in words), str(caught.value)
     assert floors._floors == before
+
+
+@pytest.mark.usefixtures("_registry")
+def test_what_is_no_floor_is_refused():
+    with pytest.raises(ValueError, match="takes a Floor, got 'wood'"):
+        register_floor("wood", 1.0)  # pyright: ignore[reportArgumentType]
