@@ -214,7 +214,7 @@ def test_help_tells_what_each_term_and_each_parameter_is(capsys):
         (["--env.rewards.landing-speed", "nan"], ["rewards.terms.landing_speed.weight", "nan"]),
         (
             ["--env.rewards.terms.foot-clearance.params.target", "0"],
-            ["rewards.terms.foot_clearance.params.target", "> 0", "0.0"],
+            ["rewards.terms.foot_clearance.params.target", ">= 1e-06", "0.0"],
         ),
         (["--env.rewards.terms.landing.weight", "1"], ["--env.rewards.terms.landing.weight"]),
         (["--env.observations.noise-level", "inf"], ["observations.noise_level", "inf"]),
