@@ -15,18 +15,20 @@ from mute.command_lines.evaluate_noise import (
     sweep_beta,
     sweep_speed,
 )
+from mute.command_lines.evaluate_reliability import ReliabilityArgs, reliability
 from mute.command_lines.evaluate_walk import WalkArgs, walk
 from mute.support.errors import MuteError
 
 __all__ = ["main"]
 
-_COMMANDS: dict[str, tuple[type, Callable[[Any], None], str]] = {
+_COMMANDS: dict[str, tuple[type, Callable[[Any], int | None], str]] = {
     "gait": (GaitArgs, gait, "walk over the command range, and at one actual speed"),
     "progress": (ProgressArgs, progress, "measure a run's checkpoints until one walks"),
     "noise": (NoiseArgs, noise, "modelled noise levels on several floors"),
     "sweep-speed": (SweepSpeedArgs, sweep_speed, "modelled noise levels against the actual speed"),
     "sweep-beta": (SweepBetaArgs, sweep_beta, "modelled noise levels against the quiet factor"),
     "walk": (WalkArgs, walk, "a long walk over mixed floors, with a map of the levels"),
+    "reliability": (ReliabilityArgs, reliability, "starts, follows, stands, heeds beta, or not"),
 }
 
 
@@ -44,8 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         given = argv[0] if argv else "nothing"
         raise MuteError(f"the first argument must be one of {', '.join(_COMMANDS)}, got {given}")
     args_type, run, _ = _COMMANDS[argv[0]]
-    run(parse(args_type, argv[1:], args_type.__doc__ or ""))
-    return 0
+    return run(parse(args_type, argv[1:], args_type.__doc__ or "")) or 0
 
 
 def _usage() -> str:

@@ -120,6 +120,7 @@ def measure_noise(
     sources: Sequence[str] = SOURCES,
     from_energies: bool = False,
     on_step: Callable[[], None] | None = None,
+    randomized: bool = False,
 ) -> list[NoiseRow]:
     """Walk straight ahead on a floor and return each setting's figures.
 
@@ -141,13 +142,14 @@ def measure_noise(
             `mute.acoustics.energy`.
         on_step: Called after each control step, of which there are `(seconds + SETTLE_TIME) /
             step_dt`.
+        randomized: Keep the training's randomised physics, pushes and sensor noise.
 
     Raises:
         MuteError: If a file cannot be written, or nothing renders.
         ValueError: If the floor or a source is not known.
     """
     robots = len(settings) * trials
-    cfg = evaluation_cfg(policy.cfg.env, robots, seconds + SETTLE_TIME, seed)
+    cfg = evaluation_cfg(policy.cfg.env, robots, seconds + SETTLE_TIME, seed, randomized)
     env = make_listening_env(cfg, surface)
     commands = torch.zeros(robots, 4)
     for index, setting in enumerate(settings):

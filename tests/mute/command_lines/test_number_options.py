@@ -23,6 +23,7 @@ _COMMANDS = {
     "evaluate sweep-speed": ("evaluate_noise", "SweepSpeedArgs"),
     "evaluate sweep-beta": ("evaluate_noise", "SweepBetaArgs"),
     "evaluate walk": ("evaluate_walk", "WalkArgs"),
+    "evaluate reliability": ("evaluate_reliability", "ReliabilityArgs"),
     "benchmark": ("benchmark", "BenchmarkArgs"),
     "meter": ("meter", "MeterArgs"),
     "calibrate": ("calibrate", "CalibrationArgs"),

@@ -1,0 +1,59 @@
+"""How many robots fall on the commands of the training."""
+
+from __future__ import annotations
+
+import torch
+
+from mute.controllers import LearnedController
+from mute.controllers.learned import Policy
+from mute.envs.commands import CommandSampler
+from mute.evaluation.reliability.conditions import OnWork, make_env, randomized_cfg, walk
+from mute.evaluation.reliability.figures import Figure, PartResult, Target
+
+__all__ = ["falls_work", "measure_falls"]
+
+_EPISODE = 20.0
+"""Length of an episode, s."""
+_FALLS = Target(below=0.01)
+
+
+def measure_falls(policy: Policy, robots: int, seed: int, on_work: OnWork) -> PartResult:
+    """Measure the share of robots that fall in an episode.
+
+    Commands and betas are drawn, and drawn anew within the episode, as the policy's task does it.
+
+    Args:
+        policy: What walks, `under_conditions`.
+        robots: Number of robots, an episode each.
+        seed: Of physics, first states, commands and noise.
+        on_work: Is told of the work that is done.
+    """
+    env = make_env(randomized_cfg(policy, robots, _EPISODE, seed))
+    controller = LearnedController(policy, robots)
+    cfg = policy.cfg.env.commands
+    generator = torch.Generator().manual_seed(seed)
+    sampler = CommandSampler(cfg, robots, generator, torch.device("cpu"))
+    everyone = torch.ones(robots, dtype=torch.bool)
+    fallen, unstable = torch.zeros_like(everyone), torch.zeros_like(everyone)
+
+    def watch(_: torch.Tensor) -> None:
+        fallen.logical_or_(env.fallen)
+        unstable.logical_or_(env.unstable)
+        on_work(robots * env.step_dt)
+
+    env.reset()
+    left, first = _EPISODE, True
+    while left > 0.5 * env.step_dt:
+        sampler.resample(everyone, with_beta=first)
+        seconds = min(left, cfg.resampling_time)
+        walk(env, controller, sampler.command.clone(), seconds, watch)
+        left, first = left - seconds, False
+    share = float(fallen.double().mean())
+    row = {"robots": robots, "fell": int(fallen.sum()), "unstable": int(unstable.sum())}
+    figures = [Figure("falls", "robots that fall in an episode of 20 s", share, "share", _FALLS)]
+    return PartResult(figures, {"falls": [row]})
+
+
+def falls_work(robots: int) -> float:
+    """Return the work of `measure_falls`, s."""
+    return robots * _EPISODE
