@@ -5,6 +5,8 @@ from __future__ import annotations
 import mujoco
 import torch
 
+from mute.support.threads import core_share
+
 from .batch_simulation import BatchSimulation
 from .simulation import Engine, Simulation
 from .warp_simulation import WarpSimulation
@@ -25,12 +27,13 @@ def make_simulation(
         model: The compiled model.
         num_envs: Number of simulations.
         device: Device that `engine` is to run on; `mjbatch` runs on the CPU, whatever it is.
-        num_threads: Size of the thread pool of `mjbatch`; 0 takes every logical CPU.
+        num_threads: Size of the thread pool of `mjbatch`; 0 takes every processor that this process
+            may use, but no more than there are simulations.
         engine: The engine; `auto` is `mjbatch` on the CPU and `warp` elsewhere.
 
     Raises:
         ValueError: If the engine is not installed, or there is no such device.
     """
     if engine == "mjbatch" or (engine == "auto" and torch.device(device).type == "cpu"):
-        return BatchSimulation(model, num_envs, num_threads)
+        return BatchSimulation(model, num_envs, num_threads or min(core_share(), num_envs))
     return WarpSimulation(model, num_envs, device)

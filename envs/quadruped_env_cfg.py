@@ -32,7 +32,7 @@ class QuadrupedEnvCfg:
     """Physics: `mjbatch` on the CPU, `warp` (MuJoCo Warp), or `auto`, the one that suits the
     device."""
     num_threads: int = 0
-    """Threads of `mjbatch`; 0 takes every logical CPU."""
+    """Threads of the physics on the CPU; 0 takes every processor that this process may use."""
     decimation: int = 4
     """Physics steps a control step; with 5 ms steps, 50 Hz."""
     episode_length: float = 20.0

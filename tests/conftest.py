@@ -54,6 +54,8 @@ _set_environment()
 
 import torch  # noqa: E402 -- it reads the environment once
 
+from mute.support.threads import usable_cores  # noqa: E402 -- with numpy, which does so as well
+
 # A slow machine is no fault, and the same examples are drawn everywhere.
 hypothesis.settings.register_profile(
     "everywhere",
@@ -71,10 +73,11 @@ _FOUND = torch.get_num_threads(), torch.get_float32_matmul_precision()
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """Return how many processes `-n auto` means: one a core, within limits; 0 for none of its own.
 
+    The cores are those that the affinity mask and a container's quota leave.
+
     A file's tests stay together, so that what names files needs no more processes than files.
     """
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    workers = min(cores or 1, _MOST_WORKERS)
+    workers = min(usable_cores(), _MOST_WORKERS)
     places = {argument.split("::")[0] for argument in config.args}
     if all(place.endswith(".py") for place in places):
         workers = min(workers, len(places))

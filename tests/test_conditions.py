@@ -7,7 +7,9 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
+import pytest
 from places import REPOSITORY
 from rich.console import Console
 
@@ -55,6 +57,19 @@ def test_the_tests_above_pass_where_signals_are_ignored_and_variables_set():
     )
     assert run.returncode == 0, run.stdout + run.stderr
     assert "2 passed" in run.stdout
+
+
+@pytest.mark.parametrize(
+    ("cores", "places", "workers"),
+    [(1, ["tests"], 0), (2, ["tests"], 2), (64, ["tests"], 8), (8, ["a.py", "b.py::test"], 2)],
+)
+def test_there_is_a_process_for_each_core_that_may_be_used(
+    cores, places, workers, request, monkeypatch
+):
+    plugin = request.config.pluginmanager.get_plugin(str(REPOSITORY / "tests" / "conftest.py"))
+    monkeypatch.setattr(plugin, "usable_cores", lambda: cores)
+    config = SimpleNamespace(args=places)
+    assert plugin.pytest_xdist_auto_num_workers(config) == workers
 
 
 def test_the_files_that_come_first_are_there(request):

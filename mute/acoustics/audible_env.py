@@ -73,4 +73,4 @@ def audible_cfg(cfg: QuadrupedEnvCfg, surface: str | None) -> QuadrupedEnvCfg:
 
 def make_listening_env(cfg: QuadrupedEnvCfg, surface: str) -> QuadrupedEnv:
     """Return the environment on a floor, see `listening_cfg`."""
-    return QuadrupedEnv(dataclasses.replace(listening_cfg(cfg, surface), num_threads=0))
+    return QuadrupedEnv(listening_cfg(cfg, surface))

@@ -33,7 +33,8 @@ _PROGRAM = REPOSITORY / "benchmarks" / "peer_program.py"
 """The program that times a peer: a checkout has it, an installed package does not."""
 
 _WAITING = ("OMP_WAIT_POLICY", "GOMP_SPINCOUNT")
-"""What `support.threads` sets to suit our own loop; a peer runs with what it would find itself."""
+"""What `support.threads` sets to suit our own loop; a peer runs with what it would find itself. The
+number of threads stays: that of the processors suits everybody."""
 
 
 @dataclass

@@ -17,7 +17,7 @@ from mute.support.errors import run_cli
 from mute.support.memory import keep_freed_memory
 from mute.support.plugins import load_plugins
 from mute.support.streams import patient_output
-from mute.support.threads import configure_threads
+from mute.support.threads import configure_threads, limit_operator_threads
 
 __all__ = [
     "benchmark",
@@ -94,7 +94,9 @@ def _start(command: str, renders: bool = False, keeps_files: bool = False) -> No
         configure_rendering(sys.argv[1:] if renders else [])  # before mujoco is
         load_plugins()
         with patient_output() if keeps_files else contextlib.nullcontext():
-            return importlib.import_module(f"mute.command_lines.{command}").main()
+            module = importlib.import_module(f"mute.command_lines.{command}")
+            limit_operator_threads()  # after torch is imported, where it is
+            return module.main()
 
     run_cli(main)
 

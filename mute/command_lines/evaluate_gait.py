@@ -156,7 +156,7 @@ def _environment(
     policy: Policy, num_envs: int, seconds: float, seed: int, randomized: bool
 ) -> QuadrupedEnv:
     cfg = evaluation_cfg(policy.cfg.env, num_envs, seconds, seed, randomized)
-    return QuadrupedEnv(dataclasses.replace(cfg, num_threads=0))
+    return QuadrupedEnv(cfg)
 
 
 def _draw_commands(env: QuadrupedEnv, seed: int) -> CommandSampler:

@@ -54,6 +54,7 @@ from mute.learning.runner import MuteRunner, OnIteration
 from mute.learning.saved_state import check_iteration
 from mute.support.errors import EXIT_USER_ERROR, MuteError
 from mute.support.files import DiskError
+from mute.support.threads import core_share
 from mute.tasks import DEFAULT_TASK, make_task
 
 __all__ = ["main"]
@@ -117,6 +118,8 @@ def _learn(argv: Sequence[str], ranks: Ranks, command: Sequence[str]) -> int:
         display = PlainDisplay() if args.plain or not ranks.first else LiveDisplay(args.task)
         if cfg.env.engine == "warp" or (cfg.env.engine == "auto" and kind == "cuda"):
             _say(ranks, "Warp compiles its kernels at their first use, for a minute or more")
+        elif cfg.env.num_threads > core_share():
+            _say(ranks, _too_many_threads(cfg.env.num_threads))
         runner = _make_runner(args, cfg, run_dir, ranks, kind, display.update)
         if checkpoint:
             _resume(runner, checkpoint)
@@ -187,6 +190,14 @@ def _train(
 def _say(ranks: Ranks, line: str) -> None:
     if ranks.first:
         print(line, file=sys.stderr)
+
+
+def _too_many_threads(threads: int) -> str:
+    """Return a warning: the user's word counts, but may have been meant for another machine."""
+    return (
+        f"warning: --env.num-threads {threads}: this process has {core_share()} of the machine's "
+        "processors, and more threads than that take turns; 0 takes as many as suit"
+    )
 
 
 def _make_runner(

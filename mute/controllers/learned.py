@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,15 +41,22 @@ class Policy:
 def load_policy(path: Path) -> Policy:
     """Load the policy of a checkpoint, or of the small file that ships.
 
+    Its physics takes the threads that suit this machine, whatever suited the one it was trained on.
+
     Raises:
         CheckpointError: If the file is missing, damaged, foreign, or does not fit this version.
     """
     saved = load_checkpoint(path)
     try:
-        return make_policy(saved)
+        return _with_own_threads(make_policy(saved))
     except (ValueError, RuntimeError) as error:
         reason = first_line(error)
         raise CheckpointError(f"{path} holds no policy that fits this version: {reason}") from error
+
+
+def _with_own_threads(policy: Policy) -> Policy:
+    env = dataclasses.replace(policy.cfg.env, num_threads=0)
+    return dataclasses.replace(policy, cfg=dataclasses.replace(policy.cfg, env=env))
 
 
 def make_policy(saved: dict[str, Any]) -> Policy:

@@ -27,7 +27,7 @@ from mute.learning.resumption import check_resumption
 from mute.learning.saved_state import check_learner, check_own_state, check_totals, entry
 from mute.learning.symmetry import groups, tie_actor_critic, tie_estimator
 from mute.support.signals import StopRequest
-from mute.support.threads import core_share, use_collection_threads
+from mute.support.threads import use_collection_threads
 
 __all__ = ["MuteRunner", "NoiseProbe", "OnIteration", "policy_part"]
 
@@ -91,7 +91,7 @@ class MuteRunner(OnPolicyRunner):
         self.ranks = ranks or Ranks()
         torch.manual_seed(self.ranks.seed(cfg.env.seed))
         self.task, self.task_cfg = task, cfg
-        env = QuadrupedEnv(_own_share(cfg.env, self.ranks), device)
+        env = QuadrupedEnv(_own_draws(cfg.env, self.ranks), device)
         estimation = cfg.agent.estimation
         estimator = make_estimator(cfg).to(device)
         if cfg.agent.symmetric:
@@ -319,12 +319,9 @@ class MuteRunner(OnPolicyRunner):
             torch.cuda.set_rng_state(state["cuda_random_state"], self.device)
 
 
-def _own_share(cfg: QuadrupedEnvCfg, ranks: Ranks) -> QuadrupedEnvCfg:
-    """Return a rank's world: its own draws, and its share of the cores where none are given."""
-    if not ranks.several:
-        return cfg
-    threads = cfg.num_threads or core_share()
-    return dataclasses.replace(cfg, seed=ranks.seed(cfg.seed), num_threads=threads)
+def _own_draws(cfg: QuadrupedEnvCfg, ranks: Ranks) -> QuadrupedEnvCfg:
+    """Return a rank's world: its own draws."""
+    return dataclasses.replace(cfg, seed=ranks.seed(cfg.seed)) if ranks.several else cfg
 
 
 def _part_of_rank(checkpoint: dict[str, Any], ranks: Ranks) -> dict[str, Any] | None:

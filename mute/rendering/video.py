@@ -23,6 +23,7 @@ from mute.envs.quadruped_env import QuadrupedEnv
 from mute.rendering.encoder import ffmpeg_program
 from mute.rendering.sound_track import add_sound
 from mute.support.errors import MuteError
+from mute.support.threads import core_share
 
 __all__ = ["Video"]
 
@@ -93,7 +94,8 @@ class Video:
             codec="libx264",
             quality=8,
             pixelformat="yuv420p",  # what every player can show
-            output_params=["-preset", "veryfast"],
+            # The encoder would start threads for all processors of the machine.
+            output_params=["-preset", "veryfast", "-threads", str(core_share())],
             ffmpeg_log_level="fatal",  # what it meets on the disk is told by us, in one line
         )
         try:

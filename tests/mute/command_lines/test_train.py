@@ -250,6 +250,34 @@ def test_what_the_world_refuses_is_told_in_one_line_and_leaves_nothing(
     assert not (tmp_path / "runs").exists()
 
 
+@pytest.mark.parametrize(
+    ("options", "warned"),
+    [
+        (("--env.num-threads", "3"), True),
+        (("--env.num-threads", "2"), False),
+        (("--env.num-threads", "0"), False),
+        (("--env.num-threads", "3", "--env.engine", "warp"), False),  # it has no such threads
+    ],
+)
+def test_more_threads_than_processors_are_taken_with_one_line_of_warning(
+    options, warned, tmp_path, capsys, monkeypatch
+):
+    taken = []
+
+    def stop(task, cfg, *args) -> None:
+        taken.append(cfg.env.num_threads)
+        raise ValueError("far enough")
+
+    monkeypatch.setattr(train, "core_share", lambda: 2)
+    monkeypatch.setattr(train, "MuteRunner", stop)
+    assert train_tiny("--log-dir", str(tmp_path / "runs"), *options) == 2
+    *lines, error = capsys.readouterr().err.splitlines()
+    warnings = [line for line in lines if line.startswith("warning: --env.num-threads 3: ")]
+    assert len(warnings) == warned
+    assert error == "error: far enough"
+    assert taken == [int(options[1])]
+
+
 def test_a_log_directory_that_cannot_be_made_is_told_in_one_line(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert train_tiny("--log-dir", str(tmp_path / "file"), "--iterations", "1") == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,16 @@ def test_a_loaded_policy_acts_as_the_runners_own_through_ends_of_episodes(traine
     assert ended > 0
 
 
+def test_a_loaded_policys_world_takes_the_threads_of_this_machine_not_those_of_its_training(
+    trained,
+):
+    runner, path = trained
+    assert runner.task_cfg.env.num_threads == 1
+    loaded = load_policy(path).cfg
+    assert loaded.env.num_threads == 0
+    assert loaded == replace(runner.task_cfg, env=replace(runner.task_cfg.env, num_threads=0))
+
+
 @torch.no_grad()
 def test_without_forgetting_at_an_episodes_end_the_actions_differ(trained):
     runner, path = trained
@@ -74,7 +85,7 @@ def test_the_small_file_gives_the_same_policy_as_the_whole_checkpoint(trained, t
     runner, path = trained
     save_checkpoint(tmp_path / "policy.pt", policy_part(load_checkpoint(path)))
     small, whole = load_policy(tmp_path / "policy.pt"), load_policy(path)
-    assert (small.task, small.iteration, small.cfg) == ("go1_mute", 2, runner.task_cfg)
+    assert (small.task, small.iteration, small.cfg) == ("go1_mute", 2, whole.cfg)
     observations = runner.env.get_observations()
     actions = [LearnedController(policy, NUM_ENVS).act(observations) for policy in (small, whole)]
     assert torch.equal(*actions)

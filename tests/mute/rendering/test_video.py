@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.learning.runner import MuteRunner, policy_part
 from mute.networks.estimator import EstimatorCfg
+from mute.support.threads import core_share
 
 FILM = """
 import resource
@@ -103,6 +105,12 @@ def test_the_camera_follows_the_robot(films):
 
 def test_a_film_has_its_name_when_it_is_whole_and_a_broken_one_leaves_nothing(films):
     assert [path for path in films.rglob("*") if path.is_file()] == [films / "new" / "whole.mp4"]
+
+
+def test_a_film_is_encoded_on_the_processors_of_this_process_alone(films):
+    # x264 writes how it was set into every film.
+    (threads,) = re.findall(rb" threads=(\d+) ", (films / "new" / "whole.mp4").read_bytes())
+    assert int(threads) == core_share()
 
 
 def test_play_finds_a_backend_and_a_film_that_is_interrupted_is_kept(tmp_path, environ):
