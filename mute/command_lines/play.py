@@ -44,7 +44,7 @@ from mute.envs.menagerie import SceneError
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.scene import Look
 from mute.evaluation.session import Session
-from mute.evaluation.trials import evaluation_cfg
+from mute.evaluation.trials import evaluation_cfg, from_the_stance
 from mute.live.keys import KEYS_HELP
 from mute.rendering.backend import has_display, why_no_window
 from mute.rendering.sound_track import temporary_sound
@@ -58,8 +58,11 @@ from mute.support.threads import use_collection_threads
 __all__ = ["PlayArgs", "main"]
 
 _DEFAULT_SECONDS = 20.0
-_SETTLE_TIME = 1.0
-"""Time after the start that the summary leaves out, s; half of a shorter walk."""
+_STAND_TIME = 0.5
+"""Time that robots stand before they get the command, s; a quarter of a shorter walk."""
+_SETTLE_TIME = 1.5
+"""Time after the start, standing included, that the figures leave out, s; half of a shorter
+walk."""
 _SURFACE = "wood"
 """Floor that is heard, and walked on where sound is kept, unless one is named."""
 
@@ -86,9 +89,10 @@ class PlayArgs(PolicyArgs):
     seconds: float | None = None
     """Time to walk, s; 20 unless given, or until the window is closed."""
     seed: int = 0
-    """Seed of the initial states."""
+    """Seed of the first states, where there are several robots, and of the noise in the sound."""
     num_envs: int = 1
-    """Number of robots; the first is shown and heard, all other figures are of all."""
+    """Number of robots; the first is shown and heard, all other figures are of all. One begins in
+    the exact stance, several each in one a little different."""
     surface: str | None = None
     """Floor to walk on and to hear, with physics at 1 ms: wood, carpet, tile or concrete. Unless
     given, training's floor and physics, with a level (modelled, sounding as wood); with --wav or
@@ -221,11 +225,12 @@ def _make_session(args: PlayArgs, endless: bool) -> Session:
     policy = load_policy(args.with_policy_found().policy)
     seconds = LONGEST_WALK if endless else args.seconds or _DEFAULT_SECONDS
     settle_time = min(_SETTLE_TIME, 0.5 * seconds)
+    stand_time = min(_STAND_TIME, 0.25 * seconds)
     env = _make_env(args, policy, seconds)
     listener = _make_listener(args, env, settle_time)
     _print_header(args, policy)
     controller = LearnedController(policy, args.num_envs)
-    return Session(env, controller, args.command, settle_time, listener)
+    return Session(env, controller, args.command, settle_time, listener, stand_time)
 
 
 def _make_env(args: PlayArgs, policy: Policy, seconds: float) -> QuadrupedEnv:
@@ -235,9 +240,13 @@ def _make_env(args: PlayArgs, policy: Policy, seconds: float) -> QuadrupedEnv:
         MuteError: If the robot cannot look as asked, or the policy's rate goes with no floor.
     """
     cfg = evaluation_cfg(policy.cfg.env, args.num_envs, seconds, args.seed)
-    # All walk along x, so that the camera has the same view of every walk.
+    # All walk along x, so that the camera has the same view of every walk; and all begin at rest,
+    # as a user's robot does. Of several, each stands a little differently.
+    joint_noise = cfg.initial_joint_noise if args.num_envs > 1 else 0.0
     cfg = dataclasses.replace(
-        cfg, random_heading=False, scene=dataclasses.replace(cfg.scene, look=args.look)
+        from_the_stance(cfg),
+        initial_joint_noise=joint_noise,
+        scene=dataclasses.replace(cfg.scene, look=args.look),
     )
     if args.floor or not args.json:
         try:

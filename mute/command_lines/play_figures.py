@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from mute.evaluation.gait import Gait
+from mute.evaluation.obedience import Verdict
 from mute.evaluation.session import Session
 
 __all__ = ["captions", "live_captions", "report", "summary"]
@@ -31,6 +32,7 @@ def report(session: Session) -> dict[str, Any]:
     command, listener = session.command, session.listener
     gait = session.gait().as_dict()
     figures = {name: gait[name] for name in _REPORTED} | (listener.levels() if listener else {})
+    figures["did_as_asked"] = session.verdict().share
     return {
         "beta": command.beta,
         "command": [command.vx, command.vy, command.wz],
@@ -80,6 +82,7 @@ def summary(session: Session, floor: str | None) -> dict[str, str]:
         "power": f"{gait.power:.1f} W",
         "fell": f"{100.0 * gait.fall_rate:.1f} % of the robots",
     }
+    figures["did as asked"] = _told(session.verdict(), session.env.num_envs)
     if gait.unstable > 0:
         figures["unstable"] = f"{gait.unstable} times, and reset: the simulation blew up"
     if gait.invalid_actions > 0:
@@ -91,6 +94,23 @@ def summary(session: Session, floor: str | None) -> dict[str, str]:
         for name in ("mnl", "pnl"):
             figures[f"level, {name.upper()}"] = f"{levels[name]:.1f} dBA ({', '.join(about)})"
     return {name: _or_dash(text) for name, text in figures.items()}
+
+
+def _told(verdict: Verdict, robots: int) -> str:
+    """Return in words whether robots, of which there are so many, did what they were asked."""
+    if verdict.judged == 0:
+        return "too short to tell: a command needs 2.5 s"
+    reasons = {
+        "fell": verdict.fell,
+        "went at less than 40 % of the command": verdict.too_slow,
+        "went at more than 160 % of the command": verdict.too_fast,
+        "did not stand still": verdict.restless,
+    }
+    if robots == 1:
+        why = ", ".join(reason for reason, count in reasons.items() if count)
+        return f"no: it {why}" if why else "yes"
+    why = ", ".join(f"{count} {reason}" for reason, count in reasons.items() if count)
+    return f"{verdict.obeyed} of {verdict.judged} robots" + (f": {why}" if why else "")
 
 
 def _or_dash(text: str) -> str:

@@ -25,6 +25,11 @@ class Command:
     beta: float = 0.5
     """Quiet factor."""
 
+    @property
+    def stands(self) -> bool:
+        """Whether it asks to stand."""
+        return self.vx == self.vy == self.wz == 0.0
+
     def changed(self, **steps: float) -> Command:
         """Return a command with steps added to its parts, held within the limits."""
         values = {}

@@ -9,8 +9,10 @@ from __future__ import annotations
 from mute.acoustics.live_listener import LiveListener
 from mute.controllers import Controller
 from mute.controllers.command import Command
+from mute.envs.commands import BETA
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.gait import Gait, GaitMeter
+from mute.evaluation.obedience import Obedience, Verdict
 
 __all__ = ["Session"]
 
@@ -25,6 +27,7 @@ class Session:
         command: Command,
         settle_time: float = 1.0,
         listener: LiveListener | None = None,
+        stand_time: float = 0.0,
     ) -> None:
         """Begin an episode of all robots.
 
@@ -34,17 +37,21 @@ class Session:
             command: What they are asked to do at first.
             settle_time: Time after the start of an episode that the summary leaves out, s.
             listener: Hears every step; it is entered and left by whoever walks.
+            stand_time: Time at the start of each episode for which a robot is asked to stand
+                before it gets the command, s.
         """
         self.env = env
         self.controller = controller
         self.listener = listener
         self._command = command
+        self._going = command
         self._settle_time = settle_time
+        self._stand_steps = round(stand_time / env.step_dt)
         self.restart()
 
     @property
     def command(self) -> Command:
-        """What all robots are asked to do."""
+        """What all robots are asked to do, once they have stood."""
         return self._command
 
     @property
@@ -55,40 +62,64 @@ class Session:
     def set_command(self, command: Command) -> None:
         """Ask all robots for something else, from the next step on."""
         self._command = command
-        self.env.set_command(command.tensor())
+        self._ask()
+
+    def stop_or_go(self) -> None:
+        """Ask all robots to stand or, if that is what they were asked, to go on as before."""
+        now = self._command
+        if now.stands:
+            going = self._going
+            self.set_command(Command(going.vx, going.vy, going.wz, now.beta))
+        else:
+            self._going = now
+            self.set_command(Command(0.0, 0.0, 0.0, now.beta))
 
     def restart(self) -> None:
         """Begin anew: robots, figures and time."""
         if self.listener is not None:
             self.listener.restart()
         self.env.reset()
-        self.env.set_command(self._command.tensor())
+        self._ask()
         self.controller.reset()
         self.steps = 0
         """Control steps since the start."""
         self._meter = GaitMeter(self.env, self._settle_time)
         self._recent = GaitMeter(self.env, settle_time=0.0)
+        self._obedience = Obedience(self.env)
 
     def step(self) -> None:
         """Walk one control step; a robot that falls starts again with the same command."""
         env = self.env
+        if self._stand_steps and bool((env.episode_length_buf == self._stand_steps).any()):
+            self._ask()
         command = env.commands.command.clone()
         _, _, dones, _ = env.step(self.controller.act(env.get_observations()))
         self.steps += 1
         if self.listener is not None:
             self.listener.listen()
-        for meter in (self._meter, self._recent):
+        for meter in (self._meter, self._recent, self._obedience):
             meter.update(command, dones)
         if bool(dones.any()):
             self.controller.reset(dones)
-            env.set_command(self._command.tensor())
+            self._ask()
 
     def gait(self) -> Gait:
         """Return the figures since the start."""
         return self._meter.gait()
+
+    def verdict(self) -> Verdict:
+        """Return how many robots did what they were asked since the start."""
+        return self._obedience.verdict()
 
     def recent_gait(self) -> Gait:
         """Return the figures since this was last asked."""
         gait = self._recent.gait()
         self._recent = GaitMeter(self.env, settle_time=0.0)
         return gait
+
+    def _ask(self) -> None:
+        """Give every robot the command, but for those that are to stand first."""
+        command = self._command.tensor().repeat(self.env.num_envs, 1)
+        standing = self.env.episode_length_buf < self._stand_steps
+        command[standing, :BETA] = 0.0
+        self.env.set_command(command)

@@ -13,7 +13,7 @@ from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.evaluation.gait import GaitMeter
 
-__all__ = ["evaluation_cfg", "run_trial"]
+__all__ = ["evaluation_cfg", "from_the_stance", "run_trial"]
 
 
 def evaluation_cfg(
@@ -47,6 +47,13 @@ def evaluation_cfg(
         measured,
         observations=dataclasses.replace(cfg.observations, noise_level=0.0),
         randomization=dataclasses.replace(cfg.randomization, enabled=False),
+    )
+
+
+def from_the_stance(cfg: QuadrupedEnvCfg) -> QuadrupedEnvCfg:
+    """Return the same environment with robots that begin in the exact stance, at rest, along x."""
+    return dataclasses.replace(
+        cfg, initial_joint_noise=0.0, initial_velocity=0.0, random_heading=False
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from mute.controllers.command import Command
 from mute.evaluation.session import Session
 
 __all__ = ["KEYS_HELP", "press"]
@@ -13,7 +12,7 @@ Keys in the window:
   left, right    turn left, right (wz +-0.1 rad/s)
   Q, E           step left, right (vy +-0.1 m/s)
   B, V           quieter, less quiet (beta +-0.1)
-  space          stand still
+  space          stand still, and go on as before
   R              start again"""
 
 # Codes are GLFW's. The viewer has a use for every letter; these ones' change nothing to be seen.
@@ -40,6 +39,6 @@ def press(session: Session, key: int) -> None:
     if key in _STEPS:
         session.set_command(session.command.changed(**_STEPS[key]))
     elif key == _STAND:
-        session.set_command(Command(0.0, 0.0, 0.0, session.command.beta))
+        session.stop_or_go()
     elif key == _RESTART:
         session.restart()

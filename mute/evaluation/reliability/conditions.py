@@ -26,7 +26,6 @@ __all__ = [
     "SOUND_WORK",
     "OnWork",
     "dealt",
-    "from_the_stance",
     "make_env",
     "randomized_cfg",
     "under_conditions",
@@ -74,13 +73,6 @@ def without_noise(cfg: QuadrupedEnvCfg) -> QuadrupedEnvCfg:
     """Return the same environment with exact sensors."""
     exact = dataclasses.replace(cfg.observations, noise_level=0.0)
     return dataclasses.replace(cfg, observations=exact)
-
-
-def from_the_stance(cfg: QuadrupedEnvCfg) -> QuadrupedEnvCfg:
-    """Return the same environment with robots that begin in the exact stance, at rest, along x."""
-    return dataclasses.replace(
-        cfg, initial_joint_noise=0.0, initial_velocity=0.0, random_heading=False
-    )
 
 
 def make_env(cfg: QuadrupedEnvCfg) -> QuadrupedEnv:

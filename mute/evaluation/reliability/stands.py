@@ -20,6 +20,7 @@ from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.evaluation.obedience import STILL_SPEED
 from mute.evaluation.reliability.conditions import (
     BETAS,
     SOUND_WORK,
@@ -48,8 +49,6 @@ _RECOVERY_TIME = 3.0
 """Time within which a robot that was pushed must stand again, s."""
 _STILL_TIME = 0.5
 """Last part of it, in which the robot must be still, s."""
-_STILL_SPEED = 0.05
-"""Mean horizontal speed of the trunk up to which a robot is still, m/s; noisy sensors shake it."""
 _SURFACE = "wood"
 _SHARE = Target(at_least=0.98)
 _JOINT_SPEED = Target(at_most=0.03)
@@ -209,7 +208,7 @@ def _stood_and_pushed(
     robots.stand(_RECOVERY_TIME - _STILL_TIME, ended.logical_or_)
     still = Stillness(env)
     robots.stand(_STILL_TIME, still.update)
-    recovered = still.feet_down & (still.trunk_speed <= _STILL_SPEED) & ~ended
+    recovered = still.feet_down & (still.trunk_speed <= STILL_SPEED) & ~ended
     return robots.means(standing.feet_down), robots.means(recovered)
 
 

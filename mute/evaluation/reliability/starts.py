@@ -25,13 +25,12 @@ from mute.evaluation.reliability.conditions import (
     BETAS,
     OnWork,
     dealt,
-    from_the_stance,
     make_env,
     randomized_cfg,
     walk,
 )
 from mute.evaluation.reliability.figures import Figure, PartResult, Target
-from mute.evaluation.trials import evaluation_cfg
+from mute.evaluation.trials import evaluation_cfg, from_the_stance
 
 __all__ = ["COMMANDS", "Start", "going_times", "measure_starts", "starts_of", "starts_work"]
 

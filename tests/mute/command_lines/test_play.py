@@ -37,7 +37,7 @@ from mute.support.errors import MuteError
 REPORTED = {
     "beta", "command", "num_envs", "seconds", "speed", "velocity_error_sq", "landing_speed_mean",
     "landing_speed_rms", "apex_mean", "duty_factor", "stride_frequency", "power", "fall_rate",
-    "unstable", "invalid_actions",
+    "unstable", "invalid_actions", "did_as_asked",
 }  # fmt: skip
 HEADLESS = {
     key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")
@@ -85,10 +85,10 @@ def policy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def heard(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Path]:
-    """Return what a second of the shipped policy on tile prints, and its sound."""
+    """Return what two seconds of the shipped policy on tile print, and their sound."""
     path = tmp_path_factory.mktemp("sound") / "new" / "tile.wav"
-    words = ("--beta", "0", "--surface", "tile", "--wav", str(path), "--seconds", "1", "--json")
-    run = _play_here(*words)
+    words = ("--beta", "0", "--vx", "1", "--surface", "tile", "--seconds", "2", "--json")
+    run = _play_here(*words, "--wav", str(path))
     assert run.returncode == 0, run.stderr
     return json.loads(run.stdout), path
 
@@ -140,7 +140,7 @@ def test_a_surface_adds_its_name_and_levels_above_the_fans_to_the_object(heard):
 
 def test_the_wav_file_has_the_whole_walk_and_is_louder_than_the_fan(heard):
     samples, rate = read_wav(heard[1])
-    assert (rate, samples.shape) == (SAMPLE_RATE, (1, SAMPLE_RATE))
+    assert (rate, samples.shape) == (SAMPLE_RATE, (1, 2 * SAMPLE_RATE))
     meter = SoundLevelMeter(rate)
     meter.update(samples * WAV_FULL_SCALE)
     assert 58.0 < meter.result()[0].laeq < 100.0  # the fan alone: 55
@@ -233,6 +233,65 @@ def test_a_walk_stopped_at_once_leaves_no_sound_and_says_so(policy, tmp_path, mo
         capsys.readouterr().err
     )
     assert not path.exists()
+
+
+# -- from a stand --------------------------------------------------------------------------------
+
+
+def _first_frames(policy: Path, monkeypatch: pytest.MonkeyPatch, *words: str) -> list[torch.Tensor]:
+    """Return the joints and all velocities at first, then the commands in force at each step."""
+    frames: list[torch.Tensor] = []
+    step = Session.step
+
+    def noted(session: Session) -> None:
+        env = session.env
+        if not frames:
+            frames.append(torch.cat((env.joint_pos, env.simulation.qvel), dim=1))
+        step(session)
+        frames.append(env.commands.command.clone())
+
+    monkeypatch.setattr(Session, "step", noted)
+    run = _play_here(
+        "--policy", str(policy), "--viewer", "none", "--seconds", "1", "--json", *words
+    )
+    assert run.returncode == 0, run.stderr
+    return frames
+
+
+def test_a_robot_begins_in_the_exact_stance_at_rest_and_stands_a_moment(policy, monkeypatch):
+    first, *commands = _first_frames(policy, monkeypatch, "--vx", "0.4", "--beta", "0.3")
+    assert float(first.abs().max()) == pytest.approx(0.0, abs=1e-6)
+    forward = [round(float(command[0, 0]), 6) for command in commands]
+    # A quarter of the walk: 12 steps, as half of 0.5 is rounded to the even.
+    assert forward == [0.0] * 12 + [0.4] * 38
+    assert all(float(command[0, 3]) == pytest.approx(0.3) for command in commands)
+
+
+def test_several_robots_begin_at_rest_each_a_little_different(policy, monkeypatch):
+    first, *_ = _first_frames(policy, monkeypatch, "--num-envs", "3")
+    joints, velocities = first[:, :12], first[:, 12:]
+    assert float(velocities.abs().max()) == 0.0
+    assert 0.0 < float(joints.abs().max()) <= 0.1
+    assert not torch.equal(joints[0], joints[1])
+
+
+def _told(command: Command, seconds: float, num_envs: int = 1) -> tuple[str, float | None]:
+    """Return what is said of robots that hold the stance, in text and as a number."""
+    cfg = evaluation_cfg(QuadrupedEnvCfg(num_threads=1), num_envs, seconds=10.0, seed=0)
+    session = Session(QuadrupedEnv(cfg), Standing(num_envs), command)
+    for _ in range(round(50 * seconds)):
+        session.step()
+    return summary(session, None)["did as asked"], report(session)["did_as_asked"]
+
+
+def test_the_summary_says_whether_a_robot_did_what_it_was_asked():
+    stand, go = Command(0.0, 0.0, 0.0, 0.5), Command(0.5, 0.0, 0.0, 0.5)
+    assert _told(stand, 3.0) == ("yes", 1.0)
+    assert _told(go, 3.0) == ("no: it went at less than 40 % of the command", 0.0)
+    several = "0 of 2 robots: 2 went at less than 40 % of the command"
+    assert _told(go, 3.0, num_envs=2) == (several, 0.0)
+    assert _told(stand, 3.0, num_envs=2) == ("2 of 2 robots", 1.0)
+    assert _told(go, 1.0) == ("too short to tell: a command needs 2.5 s", None)
 
 
 # -- what is walked and what is reported ---------------------------------------------------------

@@ -13,9 +13,16 @@ from mute.evaluation.session import Session
 from mute.evaluation.trials import evaluation_cfg
 
 
-def _make_session() -> Session:
+def _make_session(stand_time: float = 0.0) -> Session:
     cfg = evaluation_cfg(QuadrupedEnvCfg(num_threads=1), 2, seconds=10.0, seed=0)
-    return Session(QuadrupedEnv(cfg), Standing(2), Command(0.5, 0.0, 0.0, 0.5), 0.1)
+    command = Command(0.5, 0.0, 0.0, 0.5)
+    return Session(QuadrupedEnv(cfg), Standing(2), command, 0.1, stand_time=stand_time)
+
+
+def _asked(session: Session) -> list[float]:
+    """Return the forward command and the beta that the first robot observes."""
+    observed = session.env.get_observations()["policy"][0, -4:].tolist()
+    return [round(observed[0], 6), round(observed[3], 6)]
 
 
 def test_a_new_command_is_observed_and_measured_from_the_next_step_on():
@@ -56,3 +63,59 @@ def test_a_restart_forgets_figures_and_time_but_not_the_command():
     assert session.gait().fall_rate == 0.0
     expected = torch.tensor((0.1, 0.2, 0.3, 0.4))
     torch.testing.assert_close(session.env.commands.command[0], expected)
+
+
+def test_a_robot_stands_before_it_gets_the_command_and_again_after_a_fall():
+    session = _make_session(stand_time=0.1)
+    forward = []
+    for step in range(16):
+        if step == 8:
+            session.env.simulation.qpos[1, 3:7] = torch.tensor((0.0, 1.0, 0.0, 0.0))
+        asked = []
+        act = session.controller.act
+
+        def note(observations, act=act, asked=asked):
+            asked.append(observations["policy"][:, -4:].clone())
+            return act(observations)
+
+        session.controller.act = note
+        session.step()
+        session.controller.act = act
+        forward.append(asked[0][:, 0].tolist())
+    assert [first for first, _ in forward] == [0.0] * 5 + [0.5] * 11
+    # The second falls in the step of index 8.
+    assert [second for _, second in forward] == [0.0] * 5 + [0.5] * 4 + [0.0] * 5 + [0.5] * 2
+
+
+def test_a_command_that_comes_while_robots_stand_waits_for_them():
+    session = _make_session(stand_time=0.1)
+    session.step()
+    session.set_command(Command(0.8, 0.0, 0.0, 0.9))
+    assert _asked(session) == [0.0, 0.9]
+    for _ in range(5):
+        session.step()
+    assert _asked(session) == [0.8, 0.9]
+
+
+def test_stop_and_go_comes_back_to_the_command_before_with_the_beta_of_now():
+    session = _make_session()
+    session.set_command(Command(0.3, 0.1, -0.2, 0.5))
+    session.stop_or_go()
+    assert session.command == Command(0.0, 0.0, 0.0, 0.5)
+    session.set_command(session.command.changed(beta=0.2))
+    session.stop_or_go()
+    assert session.command == Command(0.3, 0.1, -0.2, 0.7)
+
+
+def test_a_robot_that_stands_did_not_do_what_it_was_asked_until_it_is_asked_to_stand():
+    session = _make_session()
+    session.set_command(Command(0.0, 0.0, 0.0, 0.5))
+    for _ in range(130):
+        session.step()
+    assert session.verdict().share == 1.0
+    session.set_command(Command(0.5, 0.0, 0.0, 0.5))
+    for _ in range(130):
+        session.step()
+    assert (session.verdict().share, session.verdict().too_slow) == (0.0, 2)
+    session.restart()
+    assert session.verdict().judged == 0

@@ -7,7 +7,8 @@ from standing import Standing
 
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
-from mute.evaluation.trials import evaluation_cfg, run_trial
+from mute.envs.scene import STAND_JOINT_POS
+from mute.evaluation.trials import evaluation_cfg, from_the_stance, run_trial
 
 
 def _make_env(num_envs=2, seconds=1.0):
@@ -48,3 +49,12 @@ def test_a_robot_that_falls_goes_on_with_its_command_and_stays_counted():
     assert forgotten is not None
     assert forgotten.tolist() == [True, False]
     assert torch.equal(env.commands.command, command)
+
+
+def test_robots_from_the_stance_are_exactly_in_it_and_at_rest():
+    cfg = from_the_stance(evaluation_cfg(QuadrupedEnvCfg(num_threads=1), 3, 2.0, seed=0))
+    env = QuadrupedEnv(cfg)
+    stance = torch.tensor(STAND_JOINT_POS).expand(3, 12)
+    torch.testing.assert_close(env.simulation.qpos[:, 7:], stance)
+    assert float(env.simulation.qvel.abs().max()) == 0.0
+    torch.testing.assert_close(env.heading, torch.tensor((1.0, 0.0)).expand(3, 2))

@@ -60,3 +60,11 @@ def test_the_restart_key_begins_anew_with_the_same_command(session):
     press(session, ord("R"))
     assert session.steps == 0
     assert session.command == Command(0.6, 0.0, 0.0, 0.5)
+
+
+def test_the_space_bar_stops_the_robots_and_lets_them_go_on(session):
+    press(session, RIGHT)
+    press(session, ord(" "))
+    assert session.command == Command(0.0, 0.0, 0.0, 0.5)
+    press(session, ord(" "))
+    assert session.command == Command(0.5, 0.0, -0.1, 0.5)

@@ -12,10 +12,8 @@ from standing import Standing
 from mute.envs.observations import ObservationsCfg
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.randomization import RandomizationCfg
-from mute.envs.scene import STAND_JOINT_POS
 from mute.evaluation.reliability.conditions import (
     dealt,
-    from_the_stance,
     randomized_cfg,
     under_conditions,
     walk,
@@ -56,15 +54,6 @@ def test_what_the_networks_were_learnt_with_stays():
     )
     assert judged.cfg.env.observations.scales == scales
     assert judged.cfg.env.action_scale == 0.3
-
-
-def test_robots_from_the_stance_are_exactly_in_it_and_at_rest():
-    cfg = from_the_stance(randomized_cfg(under_conditions(_tame_policy()), 3, 2.0, seed=0))
-    env = QuadrupedEnv(dataclasses.replace(cfg, num_threads=1))
-    stance = torch.tensor(STAND_JOINT_POS).expand(3, 12)
-    torch.testing.assert_close(env.simulation.qpos[:, 7:], stance)
-    assert float(env.simulation.qvel.abs().max()) == 0.0
-    torch.testing.assert_close(env.heading, torch.tensor((1.0, 0.0)).expand(3, 2))
 
 
 def test_settings_are_dealt_to_as_many_robots_each_side_by_side():

@@ -12,9 +12,8 @@ from standing import Standing
 
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.reliability import starts
-from mute.evaluation.reliability.conditions import from_the_stance
 from mute.evaluation.reliability.starts import COMMANDS, going_times, starts_of
-from mute.evaluation.trials import evaluation_cfg
+from mute.evaluation.trials import evaluation_cfg, from_the_stance
 
 _DT = 0.02
 _STEPS = round(starts.TRIAL_TIME / _DT)
