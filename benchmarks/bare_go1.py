@@ -30,7 +30,7 @@ class BareGo1(gymnasium.Env[np.ndarray, np.ndarray]):
             cfg: The task.
         """
         self._decimation = cfg.decimation
-        self._model = build_scene(cfg.scene, foot_samples=cfg.decimation)
+        self._model = build_scene(cfg.scene, pictured=False)
         self._data = mujoco.MjData(self._model)
         size = self._model.nq + self._model.nv
         self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float64)

@@ -1,30 +1,38 @@
-"""MuJoCo on the CPU behind the protocol of `envs.simulation`: `mjbatch`, a pool of threads."""
+"""MuJoCo on the CPU behind the protocol of `envs.simulation`: `mujoco.batch`, a pool of threads."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import mujoco
 import numpy as np
 import torch
-from mjbatch import Batch
+from mujoco.batch import Batch, SimulationError
 
-from .simulation import MAX_SPEED
+from .model_fields import load_fields, saved_fields
+from .simulation import MAX_SPEED, Stage
 
 __all__ = ["BatchSimulation"]
 
-_BAD_STATE = [
-    int(warning)
-    for warning in (
-        mujoco.mjtWarning.mjWARN_BADQPOS,
-        mujoco.mjtWarning.mjWARN_BADQVEL,
-        mujoco.mjtWarning.mjWARN_BADQACC,
-    )
-]
+_WRITTEN = ("qpos", "qvel", "ctrl")
+"""Arrays that the environment may write, parts of the engine's state."""
+
+_READ = ("sensordata", "actuator_force")
+"""Arrays that follow from the state."""
+
+_STAGES: dict[Stage, int] = {
+    "positions": int(mujoco.mjtStage.mjSTAGE_POS),
+    "all": int(mujoco.mjtStage.mjSTAGE_ACC),
+}
 
 
 class BatchSimulation:
-    """MuJoCo on a CPU thread pool (`mjbatch`), see `Simulation`.
+    """MuJoCo on a CPU thread pool (`mujoco.batch.Batch`), see `Simulation`.
 
-    Physics runs in float64; the tensors are float32 and share the engine's own buffers.
+    Physics runs in float64 and its state stays so; the tensors are copies in float32. Before every
+    call what has been written into them reaches the state, and nothing else does: a robot that
+    nobody touched keeps its state to the last bit.
     """
 
     def __init__(self, model: mujoco.MjModel, num_envs: int, num_threads: int = 0) -> None:
@@ -38,45 +46,54 @@ class BatchSimulation:
         self.model = model
         self.num_envs = num_envs
         self.device = torch.device("cpu")
+        self.substeps: dict[str, torch.Tensor] = {}
         self._batch = Batch(model, num_envs, num_threads)
-        self.qpos = self._bind("qpos")
-        self.qvel = self._bind("qvel")
-        self.ctrl = self._bind("ctrl")
-        self.sensordata = self._bind("sensordata")
-        self.actuator_force = self._bind("actuator_force")
-        self.history = (
-            self._bind("history")
-            if model.nhistory
-            else torch.zeros(num_envs, 0, device=self.device)
-        )
-        self._state = self._batch.bind("state")
-        self._time = self._batch.bind("time")
-        self._warnings = torch.from_numpy(self._batch.bind("warning"))
+        self._own = {name: self._batch.bind(name) for name in (*_WRITTEN, *_READ)}
+        self._shown = {name: own.astype(np.float32) for name, own in self._own.items()}
+        self._seen = {name: self._shown[name].copy() for name in _WRITTEN}
+        self.qpos = torch.from_numpy(self._shown["qpos"])
+        self.qvel = torch.from_numpy(self._shown["qvel"])
+        self.ctrl = torch.from_numpy(self._shown["ctrl"])
+        self.sensordata = torch.from_numpy(self._shown["sensordata"])
+        self.actuator_force = torch.from_numpy(self._shown["actuator_force"])
+        self._state = self._batch.state
+        self._warnings = torch.from_numpy(self._batch.warning)
         self._fields: dict[str, torch.Tensor] = {}
+        self._recorded: tuple[str, ...] = ()
+        self._records: dict[str, np.ndarray] = {}
         self._failed = np.zeros(num_envs, dtype=bool)
+
+    def record(self, *names: str) -> None:
+        """Keep in `substeps`, from the next `step` on, what arrays hold in its physics steps."""
+        self._recorded = tuple(dict.fromkeys((*self._recorded, *names)))
+        self._records = {}
 
     def step(self, num_steps: int = 1) -> None:
         """Advance every simulation by a number of physics steps."""
-        before = self._time.copy()
-        try:
-            self._batch.step(nstep=num_steps)
-        except RuntimeError:
-            # An engine error (an exhausted arena, say) leaves the failing simulations where they
-            # were and steps all others: a clock that stood still tells which they are.
-            self._failed |= self._time == before
+        with self._calling():
+            if not self._recorded:
+                self._batch.step(nstep=num_steps)
+                return
+            self._make_room(num_steps)
+            self._batch.rollout(num_steps, record=self._recorded, out=self._records)
 
-    def forward(self, mask: torch.Tensor | None = None) -> None:
-        """Recompute everything that follows from the state. Mask shape: (num_envs,)."""
-        self._batch.forward(None if mask is None else mask.numpy())
+    def forward(self, mask: torch.Tensor | None = None, stage: Stage = "all") -> None:
+        """Recompute what follows from the state. Mask shape: (num_envs,)."""
+        with self._calling():
+            self._batch.forward(_ids(mask), _STAGES[stage])
 
     def reset(self, mask: torch.Tensor, keyframe: int = 0) -> None:
         """Put the masked simulations to a keyframe. Mask shape: (num_envs,)."""
-        self._batch.reset(mask.numpy(), keyframe=keyframe)
-        self._failed &= ~mask.numpy()
+        ids = _ids(mask)
+        with self._calling():
+            self._batch.reset(ids, keyframe, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
+        self._failed[ids] = False
 
     def unstable(self) -> torch.Tensor:
         """Return which simulations blew up since their last reset. Shape: (num_envs,)."""
-        warned = (self._warnings[:, _BAD_STATE, 1] > 0).any(dim=1)
+        # Of whatever kind, a warning means that numbers were bad or contacts were lost, and has
+        # ended the call for its simulation.
+        warned = (self._warnings[:, :, 1] > 0).any(dim=1)
         # Negated, so that NaN counts as too fast.
         too_fast = ~(self.qvel.abs().amax(dim=1) < MAX_SPEED)
         return warned | too_fast | torch.from_numpy(self._failed)
@@ -93,7 +110,7 @@ class BatchSimulation:
 
     def state_dict(self) -> dict[str, torch.Tensor]:
         """Return all that is needed to continue bit for bit."""
-        state = {f"field/{name}": value.clone() for name, value in self._fields.items()}
+        state = saved_fields(self._fields)
         state["integration"] = torch.from_numpy(self._state.copy())
         # A push written since the last step reaches the engine's own state in the next one only.
         state["qpos"], state["qvel"] = self.qpos.clone(), self.qvel.clone()
@@ -108,27 +125,70 @@ class BatchSimulation:
         """
         if "integration" not in state:
             raise ValueError(
-                "simulation state is not of the engine 'mjbatch': go on with the engine and the"
+                "simulation state is not of the engine 'mujoco': go on with the engine and the"
                 " device that it was saved with"
             )
         integration = state["integration"].numpy()
-        if integration.shape != self._state.shape:
-            raise ValueError(
-                f"simulation state has shape {integration.shape}, this model and num_envs need "
-                f"{self._state.shape}"
-            )
-        for key, value in state.items():
-            if key.startswith("field/"):
-                self.field(key.removeprefix("field/")).copy_(value)
+        self._check_shape(integration.shape)
+        load_fields(self, state)
         self.set_const()
         self._warnings.zero_()  # of a past that is not this state's
+        self._failed[:] = False
         self._state[:] = integration
-        self._batch.forward()
+        self._show()  # nothing that was written before goes on top
+        self.forward()
         # The solver's warm start is part of the state, and `forward` has just moved it.
         self._state[:] = integration
         self.qpos.copy_(state["qpos"])
         self.qvel.copy_(state["qvel"])
-        self._failed[:] = False
 
-    def _bind(self, name: str) -> torch.Tensor:
-        return torch.from_numpy(self._batch.bind(name, np.float32))
+    def _check_shape(self, shape: tuple[int, ...]) -> None:
+        """Refuse a saved state of so many simulations and numbers."""
+        if shape[0] != self.num_envs:
+            raise ValueError(
+                f"simulation state has shape {shape}, this model and num_envs need "
+                f"{self._state.shape}"
+            )
+        if shape != self._state.shape:
+            raise ValueError(
+                f"simulation state has {shape[1]} numbers a robot, MuJoCo {mujoco.__version__} has"
+                f" {self._state.shape[1]} for this model: it is of another model or of the engine"
+                " of an earlier version, whose trainings cannot go on here; their policies play"
+                " and export as before"
+            )
+
+    @contextmanager
+    def _calling(self) -> Iterator[None]:
+        """Let a call of the engine see what has been written, and show what it made of that."""
+        for name, seen in self._seen.items():
+            written = self._shown[name] != seen
+            if written.any():
+                self._own[name][written] = self._shown[name][written]
+        try:
+            yield
+        except SimulationError as error:
+            # An engine error (an exhausted arena, say) leaves the failing simulations where they
+            # were; all others have done what they were to do.
+            self._failed[error.ids] = True
+        self._show()
+
+    def _show(self) -> None:
+        for name, own in self._own.items():
+            np.copyto(self._shown[name], own, casting="same_kind")
+        for name, seen in self._seen.items():
+            np.copyto(seen, self._shown[name])
+
+    def _make_room(self, num_steps: int) -> None:
+        """Allocate the arrays that `rollout` records into, unless they are there."""
+        if self._records and next(iter(self._records.values())).shape[1] == num_steps:
+            return
+        # State components bind as parts of wider rows, so widths alone are taken from them.
+        self._records = {
+            name: np.zeros((self.num_envs, num_steps, *self._batch.bind(name).shape[1:]))
+            for name in self._recorded
+        }
+        self.substeps = {name: torch.from_numpy(rows) for name, rows in self._records.items()}
+
+
+def _ids(mask: torch.Tensor | None) -> np.ndarray | None:
+    return None if mask is None else np.flatnonzero(mask.numpy())

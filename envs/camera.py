@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from .quadruped_env import QuadrupedEnv
+from .scene import build_scene
 
 __all__ = ["Camera"]
 
@@ -16,21 +17,23 @@ class Camera:
     def __init__(self, width: int, height: int) -> None:
         """Choose the size of a picture, pixels."""
         self._size = (height, width)
+        self._model: mujoco.MjModel | None = None
         self._renderer: mujoco.Renderer | None = None
 
     def frame(self, env: QuadrupedEnv, index: int) -> np.ndarray:
         """Return a picture of one robot, uint8. Shape: (height, width, 3)."""
-        data = mujoco.MjData(env.model)
+        # Every seed has a model of its own, but all look the same.
+        if self._model is None or self._renderer is None:
+            self._model = build_scene(env.cfg.scene)
+            self._renderer = mujoco.Renderer(self._model, *self._size)
+        data = mujoco.MjData(self._model)
         data.qpos[:] = env.simulation.qpos[index].numpy()
-        mujoco.mj_forward(env.model, data)
+        mujoco.mj_forward(self._model, data)
         camera = mujoco.MjvCamera()
         camera.lookat[:] = data.qpos[:3]
         camera.distance, camera.azimuth, camera.elevation = 1.5, 130.0, -15.0
-        # Every seed compiles its own model, but all look the same.
-        renderer = self._renderer or mujoco.Renderer(env.model, *self._size)
-        self._renderer = renderer
-        renderer.update_scene(data, camera)
-        return renderer.render().copy()
+        self._renderer.update_scene(data, camera)
+        return self._renderer.render().copy()
 
     def close(self) -> None:
         """Release the OpenGL context."""

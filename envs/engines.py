@@ -26,14 +26,14 @@ def make_simulation(
     Args:
         model: The compiled model.
         num_envs: Number of simulations.
-        device: Device that `engine` is to run on; `mjbatch` runs on the CPU, whatever it is.
-        num_threads: Size of the thread pool of `mjbatch`; 0 takes every processor that this process
+        device: Device that `engine` is to run on; `mujoco` runs on the CPU, whatever it is.
+        num_threads: Size of the thread pool of `mujoco`; 0 takes every processor that this process
             may use, but no more than there are simulations.
-        engine: The engine; `auto` is `mjbatch` on the CPU and `warp` elsewhere.
+        engine: The engine; `auto` is `mujoco` on the CPU and `warp` elsewhere.
 
     Raises:
         ValueError: If the engine is not installed, or there is no such device.
     """
-    if engine == "mjbatch" or (engine == "auto" and torch.device(device).type == "cpu"):
+    if engine == "mujoco" or (engine == "auto" and torch.device(device).type == "cpu"):
         return BatchSimulation(model, num_envs, num_threads or min(core_share(), num_envs))
     return WarpSimulation(model, num_envs, device)

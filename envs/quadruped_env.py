@@ -61,7 +61,7 @@ class QuadrupedEnv(VecEnv):
 
         Args:
             cfg: The task.
-            device: Device of the engine; with `mjbatch`, which has the CPU alone, everything stays
+            device: Device of the engine; with `mujoco`, which has the CPU alone, everything stays
                 there.
 
         Raises:
@@ -74,11 +74,12 @@ class QuadrupedEnv(VecEnv):
         """Whether `step` resets finished robots; without, it returns what they saw last, and the
         caller resets them with `reset`."""
         self.physics_listeners: list[Callable[[], None]] = []
-        """Called in turn after every physics step, with the engine's state of that step to be read.
-        Whoever listens appends itself, and removes itself in the end."""
+        """Called in turn after the physics of every control step, of which the engine's `substeps`
+        then tell. Whoever listens appends itself, and removes itself in the end."""
         self.step_dt = cfg.step_dt
         self.max_episode_length = math.ceil(cfg.episode_length / cfg.step_dt)
-        self.model = build_scene(cfg.scene, foot_samples=cfg.decimation)
+        self.model = build_scene(cfg.scene, pictured=False)
+        self._stand_key = self.model.key("stand").id
         self.simulation = make_simulation(
             self.model, cfg.num_envs, device, cfg.num_threads, cfg.engine
         )
@@ -229,19 +230,17 @@ class QuadrupedEnv(VecEnv):
         """Run the physics of one control step and record the feet at every physics step."""
         simulation = self.simulation
         torch.add(self.stand, self.action, alpha=self.cfg.action_scale, out=simulation.ctrl)
-        if not self.physics_listeners:
-            simulation.step(self.cfg.decimation)
-        else:
-            for _ in range(self.cfg.decimation):
-                simulation.step()
-                for listener in self.physics_listeners:
-                    listener()
-        self.footfalls.record(self._sensors.foot_vel_z_history, self._sensors.foot_contact_history)
+        simulation.step(self.cfg.decimation)
+        for listener in self.physics_listeners:
+            listener()
+        sensors = self._sensors
+        self.footfalls.record(sensors.foot_vel_z_substeps, sensors.foot_contact_substeps)
         self.unstable = simulation.unstable()
         if bool(self.unstable.any()):
             # Reset before anything is read, so that no NaN reaches a reward or an average.
             self.unstable_count += int(self.unstable.sum())
-            simulation.reset(self.unstable, keyframe=self.model.key("stand").id)
+            simulation.reset(self.unstable, keyframe=self._stand_key)
+            simulation.forward(self.unstable)
             self.footfalls.reset(self.unstable, self._sensors.foot_contact)
 
     def _read_state(self) -> None:
@@ -299,7 +298,7 @@ class QuadrupedEnv(VecEnv):
 
     def _reset(self, mask: torch.Tensor) -> None:
         """Begin new episodes for the masked robots; no other robot is touched."""
-        self.simulation.reset(mask, keyframe=self.model.key("stand").id)
+        self.simulation.reset(mask, keyframe=self._stand_key)
         place(self.simulation, mask, self._draw(self.num_envs, NUM_DRAWS), self.stand, self.cfg)
         self._lift_to_ground(mask)
         self.commands.resample(mask, True, self.curriculum.commands)
@@ -311,7 +310,7 @@ class QuadrupedEnv(VecEnv):
 
     def _lift_to_ground(self, mask: torch.Tensor) -> None:
         """Put the lowest foot of each masked robot on the ground: joint noise would bury it."""
-        self.simulation.forward(mask)
+        self.simulation.forward(mask, "positions")
         lowest = self._clearance().amin(dim=1)
         self.simulation.qpos[:, 2] -= torch.where(mask, lowest, 0.0)
         self.simulation.forward(mask)

@@ -29,7 +29,7 @@ class QuadrupedEnvCfg:
     seed: int = 0
     """Seed of every draw in the environment."""
     engine: Engine = "auto"
-    """Physics: `mjbatch` on the CPU, `warp` (MuJoCo Warp), or `auto`, the one that suits the
+    """Physics: `mujoco` on the CPU, `warp` (MuJoCo Warp), or `auto`, the one that suits the
     device."""
     num_threads: int = 0
     """Threads of the physics on the CPU; 0 takes every processor that this process may use."""

@@ -1,16 +1,14 @@
-"""Where the engine keeps what sensors read, now and in past physics steps."""
+"""Where the engine keeps what sensors read, now and in the physics steps of the last call."""
 
 from __future__ import annotations
 
 import mujoco
-import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from .scene import LEGS
 from .simulation import Simulation
 
-__all__ = ["RobotSensors", "past_readings", "sensor_slice"]
+__all__ = ["RobotSensors", "sensor_slice"]
 
 _NUM_SHAPES = 14
 """Collision shapes other than feet: trunk, head, and hip, thigh and shank of each leg."""
@@ -25,7 +23,7 @@ class RobotSensors:
         """Find the sensors of the scene, see `envs.scene`.
 
         Args:
-            simulation: The engine, whose feet keep their readings of a control step.
+            simulation: The engine; from now on it records what its sensors read.
 
         Raises:
             ValueError: If the model lacks one of them.
@@ -45,13 +43,28 @@ class RobotSensors:
         """Number of contacts of trunk and head. Shape: (num_envs, 2)."""
         self.shape_contact = now("trunk_contact", _NUM_SHAPES)
         """Number of contacts of every collision shape but the feet. Shape: (num_envs, 14)."""
-        self.foot_vel_z_history = past_readings(simulation, f"{LEGS[0]}_foot_vel", feet)[..., 2]
-        """Vertical velocity of each foot at the last physics steps, the oldest first, m/s.
-        Shape: (foot_samples, num_envs, 4)."""
-        self.foot_contact_history = past_readings(simulation, f"{LEGS[0]}_foot_contact", feet)[
-            ..., 0
-        ]
-        """Number of contacts of each foot, likewise. Shape: (foot_samples, num_envs, 4)."""
+        simulation.record("sensordata")
+        self._simulation = simulation
+        self._foot_vel_z = sensor_slice(model, f"{LEGS[0]}_foot_vel", feet).start + 2
+        self._foot_contact = sensor_slice(model, f"{LEGS[0]}_foot_contact", feet)
+
+    @property
+    def foot_vel_z_substeps(self) -> torch.Tensor:
+        """Vertical velocity of each foot at the physics steps of the last step, m/s.
+
+        Shape: (num_steps, num_envs, 4).
+        """
+        columns = slice(self._foot_vel_z, self._foot_vel_z + 3 * len(LEGS), 3)
+        return self._simulation.substeps["sensordata"][:, :, columns].transpose(0, 1).float()
+
+    @property
+    def foot_contact_substeps(self) -> torch.Tensor:
+        """Number of contacts of each foot at the physics steps of the last step.
+
+        Shape: (num_steps, num_envs, 4).
+        """
+        found = self._simulation.substeps["sensordata"][:, :, self._foot_contact]
+        return found.transpose(0, 1).float()
 
 
 def sensor_slice(model: mujoco.MjModel, first_name: str, count: int) -> slice:
@@ -77,62 +90,3 @@ def sensor_slice(model: mujoco.MjModel, first_name: str, count: int) -> slice:
         raise ValueError(f"the {count} sensors from {first_name!r} on are not contiguous: {names}")
     start = int(model.sensor_adr[first])
     return slice(start, start + count * int(model.sensor_dim[first]))
-
-
-def past_readings(simulation: Simulation, first_name: str, count: int) -> torch.Tensor:
-    """Return what `count` sensors, from `first_name` on, read at the last physics steps.
-
-    The oldest reading comes first after every whole round of steps, of as many as are kept. It is a
-    view of the engine's own buffer, which follows every step.
-
-    Returns:
-        Shape: (samples, num_envs, count, dimension of a sensor).
-
-    Raises:
-        ValueError: There are no such sensors, they keep nothing, or this version of MuJoCo keeps it
-            in another order.
-    """
-    model = simulation.model
-    columns = sensor_slice(model, first_name, count)  # checks that they are there and of a kind
-    size = (columns.stop - columns.start) // count
-    first = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, first_name)
-    samples = int(model.sensor_history[first, 0])
-    if samples < 1:
-        raise ValueError(f"first_name is {first_name!r}: the sensor keeps no past readings")
-    width = samples * size
-    places = np.stack([_history_places(model, first + i, samples, size) for i in range(count)])
-    start, stride = int(places[0, 0]), int(places[1, 0] - places[0, 0]) if count > 1 else width
-    regular = start + stride * np.arange(count)[:, np.newaxis] + np.arange(width)
-    if not np.array_equal(places, regular):
-        raise ValueError(_ANOTHER_ORDER)
-    rows = simulation.history[:, start:].unfold(1, width, stride)[:, :count]
-    return rows.unflatten(2, (samples, size)).permute(2, 0, 1, 3)
-
-
-_ANOTHER_ORDER = (
-    f"MuJoCo {mujoco.__version__} keeps past readings in another order than the versions that are"
-    " known here: install one of those that pyproject.toml names"
-)
-
-
-def _history_places(
-    model: mujoco.MjModel, sensor: int, samples: int, size: int
-) -> NDArray[np.integer]:
-    """Return where a sensor's past readings lie in MuJoCo's `history`, the oldest first.
-
-    MuJoCo documents how to write them there but not where that is, so marks are written and found.
-
-    Returns:
-        Places of all numbers of all readings. Shape: (samples * size,).
-
-    Raises:
-        ValueError: The marks are not found.
-    """
-    data = mujoco.MjData(model)
-    times = np.arange(-samples, 0.0)[:, np.newaxis]
-    marks = np.arange(samples * size) + 0.5  # no time and no count
-    mujoco.mj_initSensorHistory(model, data, sensor, times, marks.reshape(samples, size), 0.0)
-    mark, place = np.nonzero(data.history == marks[:, np.newaxis])
-    if not np.array_equal(mark, np.arange(len(marks))):
-        raise ValueError(_ANOTHER_ORDER)
-    return place

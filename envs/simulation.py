@@ -8,15 +8,19 @@ is, when it is reset and to which state is the environment's business.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal, Protocol
 
 import mujoco
 import torch
 
-__all__ = ["MAX_SPEED", "Engine", "Simulation"]
+__all__ = ["MAX_SPEED", "Engine", "Simulation", "Stage"]
 
-Engine = Literal["auto", "mjbatch", "warp"]
+Engine = Literal["auto", "mujoco", "warp"]
 """MuJoCo on the CPU's threads, MuJoCo Warp, or the one that suits the device."""
+
+Stage = Literal["positions", "all"]
+"""How far `forward` goes: to what follows from positions alone, or to everything."""
 
 MAX_SPEED = 200.0
 """Largest generalised speed (m/s or rad/s) of a simulation that still counts as stable: over six
@@ -29,7 +33,7 @@ class Simulation(Protocol):
     The tensors are live: they are written by `step`, `reset` and `forward`, and what is written
     into `qpos`, `qvel` and `ctrl` takes effect at the next of these calls. `sensordata` and
     `actuator_force` lag `qpos` and `qvel` by one physics step after `step`, as MuJoCo's own do
-    after `mj_step`, and are current after `reset` and `forward`.
+    after `mj_step`, are current after `forward`, and mean nothing between `reset` and `forward`.
     """
 
     model: mujoco.MjModel
@@ -48,20 +52,45 @@ class Simulation(Protocol):
     """Sensor readings. Shape: (num_envs, nsensordata)."""
     actuator_force: torch.Tensor
     """Actuator forces, N or N m. Shape: (num_envs, nu)."""
-    history: torch.Tensor
-    """Past readings of the sensors that keep them, see `sensors.past_readings`: rings, which begin
-    with the oldest reading after as many steps as they hold. Shape: (num_envs, nhistory)."""
+
+    @property
+    def substeps(self) -> Mapping[str, torch.Tensor]:
+        """What each physics step of the last `step` left in the arrays that are recorded, by name.
+
+        They are in the engine's own precision. A simulation that stopped on the way repeats its
+        last. `sensordata` and `actuator_force` lag here as well. Shape of each:
+        (num_envs, num_steps, ...).
+        """
+        ...
+
+    def record(self, *names: str) -> None:
+        """Keep in `substeps`, from the next `step` on, what arrays hold in its physics steps.
+
+        Args:
+            names: Some of the tensors above; those that were recorded before still are.
+        """
+        ...
 
     def step(self, num_steps: int = 1) -> None:
         """Advance every simulation by a number of physics steps."""
         ...
 
-    def forward(self, mask: torch.Tensor | None = None) -> None:
-        """Recompute everything that follows from the state. Mask shape: (num_envs,)."""
+    def forward(self, mask: torch.Tensor | None = None, stage: Stage = "all") -> None:
+        """Recompute what follows from the state.
+
+        Args:
+            mask: Simulations to do that for; None for all. Shape: (num_envs,).
+            stage: How far to go. After `positions` only the sensors of positions are current.
+        """
         ...
 
     def reset(self, mask: torch.Tensor, keyframe: int = 0) -> None:
-        """Put the masked simulations to a keyframe. Mask shape: (num_envs,)."""
+        """Put the masked simulations to a keyframe; `forward` then tells what follows from it.
+
+        Args:
+            mask: Simulations to reset. Shape: (num_envs,).
+            keyframe: Number of the keyframe in the model.
+        """
         ...
 
     def unstable(self) -> torch.Tensor:

@@ -3,7 +3,7 @@
 A physics step, a forward pass and a reset are graphs of kernels, captured after their first use and
 replayed from then on. torch reads and writes the engine's own arrays, so a control step copies
 nothing between device and host. Warp replays graphs on the CPU as well, and that is how the tests
-hold this engine to `mjbatch`; on a GPU it has not been run.
+hold this engine to MuJoCo itself; on a GPU it has not been run.
 
 Warp compiles kernels at their first use and keeps them in a cache of its own (`WARP_CACHE_PATH`).
 """
@@ -19,7 +19,8 @@ import mujoco
 import numpy as np
 import torch
 
-from .simulation import MAX_SPEED
+from .model_fields import load_fields, saved_fields
+from .simulation import MAX_SPEED, Stage
 
 __all__ = ["WarpSimulation"]
 
@@ -29,7 +30,6 @@ _STATE = (
     "ctrl",
     "qacc_warmstart",
     "time",
-    "history",
     "sensordata",
     "actuator_force",
     "overflow",
@@ -77,26 +77,32 @@ class WarpSimulation:
         self.ctrl = self._state["ctrl"]
         self.sensordata = self._state["sensordata"]
         self.actuator_force = self._state["actuator_force"]
-        self.history = self._state["history"]
+        self.substeps: dict[str, torch.Tensor] = {}
+        self._recorded: tuple[str, ...] = ()
         self._fields: dict[str, torch.Tensor] = {}
         self._graphs: dict[Callable[..., None], Any] = {}
         overflow = self._engine.OverflowType
-        # `mjbatch` stops its solver at these limits, too; all others lose contacts or constraints.
+        # MuJoCo stops its solver at these limits, too; all others lose contacts or constraints.
         self._harmless = int(overflow.ITERATIONS | overflow.LS_ITERATIONS)
+
+    def record(self, *names: str) -> None:
+        """Keep in `substeps`, from the next `step` on, what arrays hold in its physics steps."""
+        self._recorded = tuple(dict.fromkeys((*self._recorded, *names)))
+        self.substeps = {}
 
     def step(self, num_steps: int = 1) -> None:
         """Advance every simulation by a number of physics steps."""
-        for _ in range(num_steps):
+        self._make_room(num_steps)
+        for index in range(num_steps):
             self._run(self._engine.step)
+            for name, rows in self.substeps.items():
+                rows[:, index] = self._state[name]
 
-    def forward(self, mask: torch.Tensor | None = None) -> None:
-        """Recompute everything that follows from the state. Mask shape: (num_envs,)."""
+    def forward(self, mask: torch.Tensor | None = None, stage: Stage = "all") -> None:
+        """Recompute what follows from the state, at any stage all of it. Mask: (num_envs,)."""
         readings = (self.sensordata, self.actuator_force)
         before = [reading.clone() for reading in readings]
-        history = self.history.clone()
         self._run(self._engine.forward)
-        # MuJoCo Warp keeps a reading from every forward pass; MuJoCo, from steps alone.
-        self.history.copy_(history)
         if mask is not None:
             for reading, old in zip(readings, before, strict=True):
                 torch.where(mask.unsqueeze(1), reading, old, out=reading)
@@ -106,7 +112,6 @@ class WarpSimulation:
         # A keyframe that does not exist leaves a simulation as it is.
         self._view(self._keyframes).copy_(torch.where(mask, keyframe, -1))
         self._run(self._engine.reset_data_keyframe, self._keyframes)
-        self.forward(mask)
 
     def unstable(self) -> torch.Tensor:
         """Return which simulations blew up since their last reset. Shape: (num_envs,)."""
@@ -119,22 +124,22 @@ class WarpSimulation:
     def field(self, name: str) -> torch.Tensor:
         """Return a model field per simulation, to be written. Shape: (num_envs, ...)."""
         if name not in self._fields:
-            self._expand(self._model, name)
+            self._expand(name)
             self._fields[name] = self._view(getattr(self._model, name))
         return self._fields[name]
 
     def set_const(self) -> None:
         """Recompute the constants that depend on model fields, after writing these."""
         for name in _DERIVED:
-            self._expand(self._model, name)
-        self._expand(self._model.stat, "meaninertia")
+            self._expand(name)
         with self._on_torch_stream():
             self._engine.set_const(self._model, self._data)
 
     def state_dict(self) -> dict[str, torch.Tensor]:
         """Return all that is needed to continue, on the CPU bit for bit."""
-        state = {f"field/{name}": value.clone() for name, value in self._fields.items()}
-        return state | {name: value.clone() for name, value in self._state.items()}
+        return saved_fields(self._fields) | {
+            name: value.clone() for name, value in self._state.items()
+        }
 
     def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
         """Continue from a `state_dict`.
@@ -154,12 +159,22 @@ class WarpSimulation:
                     f"simulation state's {name} has shape {tuple(state[name].shape)}, this model "
                     f"and num_envs need {tuple(own.shape)}"
                 )
-        for key, value in state.items():
-            if key.startswith("field/"):
-                self.field(key.removeprefix("field/")).copy_(value)
+        load_fields(self, state)
         self.set_const()
         for name, own in self._state.items():
             own.copy_(state[name])
+
+    def _make_room(self, num_steps: int) -> None:
+        """Allocate the arrays that `step` records into, unless they are there."""
+        if all(rows.shape[1] == num_steps for rows in self.substeps.values()) and (
+            len(self.substeps) == len(self._recorded)
+        ):
+            return
+        own = {name: self._state[name] for name in self._recorded}
+        self.substeps = {
+            name: rows.new_zeros(num_steps, *rows.shape).transpose(0, 1)
+            for name, rows in own.items()
+        }
 
     def _set_options(self) -> None:
         options = self._model.opt
@@ -168,9 +183,9 @@ class WarpSimulation:
             # Drivers before CUDA 12.4 cannot end a solver's loop early inside a graph.
             options.graph_conditional = self._warp.is_conditional_graph_supported()
 
-    def _expand(self, owner: Any, name: str) -> None:  # noqa: ANN401
+    def _expand(self, name: str) -> None:
         """Give a field of the model a row for every simulation, in place of the common one."""
-        common = getattr(owner, name)
+        common = getattr(self._model, name)
         if common.shape[0] == self.num_envs:
             return
         if common.shape[0] != 1:
@@ -178,7 +193,7 @@ class WarpSimulation:
         with self._on_torch_stream():
             row = self._view(common)
             rows = row.expand(self.num_envs, *row.shape[1:]).contiguous()
-            setattr(owner, name, self._warp.from_torch(rows, dtype=common.dtype))
+            setattr(self._model, name, self._warp.from_torch(rows, dtype=common.dtype))
         self._graphs.clear()  # they would go on with the old array
 
     def _run(self, function: Callable[..., None], *args: Any) -> None:  # noqa: ANN401
@@ -229,7 +244,7 @@ def _load_packages() -> tuple[Any, Any]:
     except ImportError as error:
         raise ValueError(
             "the engine 'warp' needs the package mujoco_warp: pip install 'mute[gpu]', or let"
-            " the physics run on the CPU with env.engine 'mjbatch'"
+            " the physics run on the CPU with env.engine 'mujoco'"
         ) from error
 
 

@@ -66,6 +66,9 @@ _HEIGHTS = {
 MOVED: dict[str, str] = _WEIGHTS | _CONSTANTS | _HEIGHTS
 """Where the fields of earlier configurations are now, as paths."""
 
+_ENGINES = {"mjbatch": "mujoco"}
+"""Engines of earlier versions, and those that took their place."""
+
 _CRITICS_HEIGHTS = {"height_offset": 0.30, "height_scale": 0.1}
 """How the critic saw heights while only the estimator could be told otherwise, m."""
 
@@ -76,6 +79,9 @@ def upgraded(data: dict[str, Any]) -> dict[str, Any]:
     What is in it already, or fits neither form, stays as it is.
     """
     data = copy.deepcopy(data)
+    env = _mapping(data, ["env"])
+    if env is not None and env.get("engine") in _ENGINES:
+        env["engine"] = _ENGINES[env["engine"]]
     rewards = _mapping(data, ["env", "rewards"])
     flat = rewards is not None and "terms" not in rewards and _holds(rewards, _WEIGHTS | _CONSTANTS)
     for old, new in (MOVED if flat else _HEIGHTS).items():

@@ -36,25 +36,26 @@ def _walk(timestep: float, beta: float) -> dict[str, float]:
     )
     columns = sensor_slice(env.model, f"{LEGS[0]}_foot_force", len(LEGS))
     forces, power = [], []
+    env.simulation.record("qvel", "actuator_force")
 
     def record() -> None:
-        simulation = env.simulation
-        forces.append(simulation.sensordata[:, columns].reshape(-1, 4, 3)[..., 2].abs())
-        power.append((simulation.actuator_force * simulation.qvel[:, 6:]).abs().sum(dim=1).mean())
+        steps = {name: rows.transpose(0, 1) for name, rows in env.simulation.substeps.items()}
+        forces.append(steps["sensordata"][:, :, columns].unflatten(2, (4, 3))[..., 2].abs())
+        power.append((steps["actuator_force"] * steps["qvel"][:, :, 6:]).abs().sum(dim=2).mean(1))
 
     env.physics_listeners.append(record)
     command = torch.tensor([0.5, 0.0, 0.0, beta])
     steps = round(SECONDS / env.step_dt)
     gait = run_trial(env, LearnedController(policy, ROBOTS), command, steps).gait()
     first = round(SETTLE / timestep)
-    force = torch.stack(forces)[first:]
+    force = torch.cat(forces)[first:]
     # The greatest force of each foot in each half second: every one lands in it.
     windows = force.unflatten(0, (-1, round(0.5 / timestep)))
     return {
         "landing_speed": gait.landing_speed_rms,
         "force_rms": float(force.square().mean().sqrt()),
         "peak_force": float(windows.amax(dim=1).mean()),
-        "work": float(torch.stack(power)[first:].mean()),
+        "work": float(torch.cat(power)[first:].mean()),
     }
 
 

@@ -1,7 +1,7 @@
-"""What an environment's robots do, copied at every physics step; the sound is made of it later.
+"""What an environment's robots do at every physics step, kept; the sound is made of it later.
 
-Nothing is sampled at the control rate: an impact is over within a control step. The recorder only
-copies while the physics runs; a block is worked out when it is taken.
+Nothing is sampled at the control rate: an impact is over within a control step. The engine records
+while the physics runs, and the recorder only copies; a block is worked out when it is taken.
 """
 
 from __future__ import annotations
@@ -30,11 +30,14 @@ _CREEP = 0.02
 foot that carries load creeps, where a real one stands. From 1 to 5 cm/s scuffing changes by 3 dB on
 wood, and the mean level of a walk by less than 0.3 dB."""
 
+_RECORDED = ("sensordata", "qpos", "qvel", "actuator_force")
+"""What is kept of every physics step, of the engine's arrays."""
+
 FloorAt = Callable[[NDArray[np.floating]], NDArray[np.integer]]
 
 
 class Recorder:
-    """Copies the state of every physics step of an environment, and makes blocks of it.
+    """Keeps the state of every physics step of an environment, and makes blocks of it.
 
     The environment needs `scene.foot_forces`. A robot that begins anew in between jumps, drops and
     lands: whoever resets robots calls `restart`.
@@ -68,14 +71,12 @@ class Recorder:
             name: sensor_slice(env.model, f"{LEGS[0]}_foot_{name}", feet)
             for name in ("pos", "vel", "contact", "force", "angvel")
         }
-        simulation = env.simulation
-        self._live = {
-            name: getattr(simulation, name).numpy()[robots or slice(None)]
-            for name in ("sensordata", "qpos", "qvel", "actuator_force")
-        }
-        self._rows: dict[str, list[NDArray]] = {name: [] for name in self._live}
+        env.simulation.record(*_RECORDED)
+        self._robots = robots or slice(None)
+        self._rows: dict[str, list[NDArray[np.float32]]] = {name: [] for name in _RECORDED}
+        self._recorded = 0
         self._release = max(1, round(_RELEASE / self.timestep))
-        self._last_qpos = self._live["qpos"].copy()
+        self._last_qpos = env.simulation.qpos.numpy()[self._robots].copy()
         # All begin on the ground: the first contact is no impact.
         self._touched = np.ones((self._release, len(self._last_qpos), feet), dtype=bool)
         self._stood = np.ones((len(self._last_qpos), feet), dtype=bool)
@@ -96,10 +97,9 @@ class Recorder:
             unstable: Those whose simulation blew up in the control step just made: in its place
                 they are recorded at rest where they begin anew. Shape: (robots recorded,).
         """
-        self._restarts.append((len(self._rows["qpos"]), robots.copy()))
-        if unstable is not None and unstable.any():
-            for row in range(-min(self._env.cfg.decimation, len(self._rows["qpos"])), 0):
-                self._lay_at_rest(row, unstable)
+        self._restarts.append((self._recorded, robots.copy()))
+        if unstable is not None and unstable.any() and self._recorded:
+            self._lay_at_rest(unstable)
 
     def take(self) -> ContactBlock:
         """Return what happened since the last call, and forget it.
@@ -107,11 +107,12 @@ class Recorder:
         Raises:
             ValueError: If nothing happened.
         """
-        if not self._rows["qpos"]:
+        if not self._recorded:
             raise ValueError("no physics step since the last block")
-        rows = {name: np.stack(values) for name, values in self._rows.items()}
+        rows = {name: np.concatenate(values) for name, values in self._rows.items()}
         for values in self._rows.values():
             values.clear()
+        self._recorded = 0
         start = self._steps * self.timestep
         steps, robots = rows["qpos"].shape[:2]
         self._steps += steps
@@ -139,18 +140,23 @@ class Recorder:
         return block
 
     def _record(self) -> None:
-        for name, live in self._live.items():
-            self._rows[name].append(live.copy())
+        """Keep the physics steps of a control step, steps first."""
+        substeps = self._env.simulation.substeps
+        for name, rows in self._rows.items():
+            own = substeps[name][self._robots].transpose(0, 1)
+            rows.append(own.numpy().astype(np.float32))
+        self._recorded += substeps["qpos"].shape[1]
 
-    def _lay_at_rest(self, row: int, robots: NDArray[np.bool_]) -> None:
-        """Replace what was recorded in a physics step: neither speed, force nor contact."""
+    def _lay_at_rest(self, robots: NDArray[np.bool_]) -> None:
+        """Replace what was recorded in the last control step: no speed, force or contact."""
+        last = {name: rows[-1] for name, rows in self._rows.items()}
         for name in ("qvel", "actuator_force", "sensordata"):
-            self._rows[name][row][robots] = 0.0
-        qpos = self._live["qpos"][robots]
-        self._rows["qpos"][row][robots] = qpos
-        sensors = self._rows["sensordata"][row][robots]
-        sensors[:, self._columns["pos"]] = np.tile(qpos[:, :3], len(LEGS))
-        self._rows["sensordata"][row][robots] = sensors
+            last[name][:, robots] = 0.0
+        qpos = self._env.simulation.qpos.numpy()[self._robots][robots]
+        last["qpos"][:, robots] = qpos
+        sensors = last["sensordata"][:, robots]
+        sensors[:, :, self._columns["pos"]] = np.tile(qpos[:, :3], len(LEGS))
+        last["sensordata"][:, robots] = sensors
 
     def _floor(self, xy: NDArray[np.floating]) -> NDArray[np.integer]:
         if callable(self._floor_at):

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from mjbatch import Batch
+from mujoco.batch import Batch
 from rich.progress import track
 from rsl_rl.algorithms import PPO
 from rsl_rl.utils import check_nan
@@ -87,7 +87,7 @@ class Rates:
     rollouts: int
     """Turns that were timed."""
     engine: float
-    """mjbatch alone: the physics steps of a control step in one call, of the training's robots."""
+    """MuJoCo alone: the physics steps of a control step in one call, of the training's robots."""
     nominal_engine: float
     """The same of robots without randomisation that stand, shaken by noise."""
     environment: float
@@ -215,7 +215,7 @@ def _median_ratio(engine: Sequence[float], part: Sequence[float]) -> float:
 
 
 class _Physics:
-    """mjbatch alone: control steps of robots whose set points are given."""
+    """MuJoCo alone: control steps of robots whose set points are given."""
 
     def __init__(self, env: QuadrupedEnv) -> None:
         """Make nominal robots of the model of an environment."""
@@ -249,7 +249,7 @@ class _Replay:
         self._physics = _Physics(env)
         self.engine = self._physics.run
         batch = self._physics.batch
-        self._state = batch.bind("state")
+        self._state = batch.state
         for key, value in env.simulation.state_dict().items():
             if key.startswith("field/"):
                 batch.expand(key.removeprefix("field/"))[:] = value.numpy()

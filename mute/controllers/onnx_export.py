@@ -8,7 +8,6 @@ means; `examples/run_onnx.py` is a program that knows nothing else.
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import json
 import logging
 import warnings
@@ -146,7 +145,7 @@ def _strip_notes(graph: onnx.GraphProto) -> None:
 def _metadata(cfg: QuadrupedEnvCfg) -> dict[str, str]:
     """Return what a program must know to run the graph, see `export_policy`."""
     # The look is no part of the physics, and may need meshes that are not here.
-    model = build_scene(dataclasses.replace(cfg.scene, look="primitives"))
+    model = build_scene(cfg.scene, pictured=False)
     joints = [model.joint(name) for name in JOINT_NAMES]
     servos = [_servo_of(model, joint.id) for joint in joints]
     stand = model.key("stand").qpos

@@ -16,6 +16,7 @@ from typing import Any
 import mujoco
 import mujoco.viewer
 
+from mute.envs.scene import build_scene
 from mute.evaluation.session import Session
 from mute.live.keys import press
 from mute.support.errors import MuteError
@@ -41,13 +42,14 @@ def watch(session: Session, num_steps: int | None, captions: Callable[[], dict[s
         MuteError: If this Python cannot open windows (on macOS, that is mjpython's alone).
     """
     env, keys = session.env, queue.SimpleQueue[int]()
-    data = mujoco.MjData(env.model)
+    model = build_scene(env.cfg.scene)
+    data = mujoco.MjData(model)
     data.qpos[:] = env.simulation.qpos[0].numpy()
     per_second = round(1.0 / env.step_dt)
     due = time.perf_counter()
-    with _open(env.model, data, keys.put) as viewer:
+    with _open(model, data, keys.put) as viewer:
         viewer.cam.type = mujoco.mjtCamera.mjCAMERA_TRACKING
-        viewer.cam.trackbodyid = env.model.body("trunk").id
+        viewer.cam.trackbodyid = model.body("trunk").id
         viewer.cam.azimuth, viewer.cam.elevation, viewer.cam.distance = 125.0, -14.0, 1.5
         while viewer.is_running() and (num_steps is None or session.steps < num_steps):
             while not keys.empty():
@@ -55,7 +57,7 @@ def watch(session: Session, num_steps: int | None, captions: Callable[[], dict[s
             session.step()
             with viewer.lock():
                 data.qpos[:] = env.simulation.qpos[0].numpy()
-                mujoco.mj_forward(env.model, data)
+                mujoco.mj_forward(model, data)
             if session.steps % per_second == 0:
                 shown = captions()
                 viewer.set_texts((None, None, "\n".join(shown), "\n".join(shown.values())))

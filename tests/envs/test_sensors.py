@@ -10,7 +10,7 @@ import torch
 
 from mute.envs.batch_simulation import BatchSimulation
 from mute.envs.scene import LEGS, SceneCfg, build_scene, make_spec
-from mute.envs.sensors import RobotSensors, past_readings, sensor_slice
+from mute.envs.sensors import RobotSensors, sensor_slice
 
 
 @pytest.fixture(scope="module")
@@ -42,60 +42,30 @@ def test_sensor_slice_refuses_sensors_of_another_kind_in_between():
         sensor_slice(spec.compile(), "FR_foot_pos", 4)
 
 
-def test_the_robots_sensors_follow_the_engine_and_keep_its_last_physics_steps():
-    samples = 4
-    simulation = BatchSimulation(build_scene(SceneCfg(), foot_samples=samples), num_envs=2)
-    simulation.reset(torch.ones(2, dtype=torch.bool))
-    simulation.qpos[:, 2] += torch.tensor([0.0, 0.1])  # one stands, the other drops
+def test_the_robots_sensors_follow_the_engine_and_every_physics_step_of_it():
+    num_steps = 4
+    several, single = (BatchSimulation(build_scene(SceneCfg()), num_envs=2) for _ in range(2))
     tilt = 0.05
-    simulation.qpos[1, 3:5] = torch.tensor([math.cos(tilt), math.sin(tilt)])  # onto its right feet
-    simulation.forward()
-    sensors = RobotSensors(simulation)
+    for simulation in (several, single):
+        simulation.reset(torch.ones(2, dtype=torch.bool))
+        simulation.qpos[:, 2] += torch.tensor([0.0, 0.1])  # one stands, the other drops
+        # onto its right feet
+        simulation.qpos[1, 3:5] = torch.tensor([math.cos(tilt), math.sin(tilt)])
+        simulation.forward()
+    sensors, now = RobotSensors(several), RobotSensors(single)
     in_part = False
     for _ in range(20):
         seen = []
-        for _ in range(samples):  # a ring begins with its oldest reading after whole rounds
-            simulation.step()
-            seen.append((sensors.foot_vel[..., 2].clone(), sensors.foot_contact.clone()))
+        for _ in range(num_steps):
+            single.step()
+            seen.append((now.foot_vel[..., 2].clone(), now.foot_contact.clone()))
+        several.step(num_steps)
         foot_vel_z, foot_contact = (torch.stack(part) for part in zip(*seen, strict=True))
-        assert torch.equal(sensors.foot_vel_z_history, foot_vel_z)
-        assert torch.equal(sensors.foot_contact_history, foot_contact)
+        assert torch.equal(sensors.foot_vel_z_substeps.float(), foot_vel_z)
+        assert torch.equal(sensors.foot_contact_substeps.float(), foot_contact)
         in_part |= 0 < int(foot_contact[:, 1].sum()) < foot_contact[:, 1].numel()
-        _check_against_mujoco(simulation, sensors)
+        _check_against_mujoco(several, sensors)
     assert in_part  # feet, robots and times differ in their contacts
-
-
-@pytest.mark.parametrize(("first", "count", "size"), [("FL_foot_vel", 2, 3), ("RL_foot_vel", 1, 3)])
-def test_past_readings_of_some_sensors_are_theirs(first, count, size):
-    simulation = BatchSimulation(build_scene(SceneCfg(), foot_samples=2), num_envs=1)
-    simulation.qpos[:, 2] += 0.2
-    simulation.qvel[:, 3:6] = torch.tensor([1.0, 2.0, 3.0])  # every foot moves as none other does
-    past, now = past_readings(simulation, first, count), []
-    for _ in range(2):
-        simulation.step()
-        now.append(simulation.sensordata[:, sensor_slice(simulation.model, first, count)].clone())
-    assert torch.equal(past, torch.stack(now).view(2, 1, count, size))
-    assert past[1].unique().numel() == count * size
-
-
-def test_past_readings_of_a_sensor_that_keeps_none_are_refused(model):
-    with pytest.raises(ValueError, match="'FR_foot_vel': the sensor keeps no past readings"):
-        past_readings(BatchSimulation(model, num_envs=1), "FR_foot_vel", 4)
-
-
-@pytest.mark.parametrize("another", [lambda marks: marks[::-1], lambda marks: 0.0 * marks])
-def test_a_mujoco_that_keeps_past_readings_otherwise_is_refused_and_not_misread(
-    another, monkeypatch
-):
-    write = mujoco.mj_initSensorHistory
-
-    def write_otherwise(model, data, sensor, times, values, phase):
-        write(model, data, sensor, times, another(values).copy(), phase)
-
-    monkeypatch.setattr(mujoco, "mj_initSensorHistory", write_otherwise)
-    simulation = BatchSimulation(build_scene(SceneCfg(), foot_samples=4), num_envs=1)
-    with pytest.raises(ValueError, match=f"MuJoCo {mujoco.__version__} keeps .* another order"):
-        RobotSensors(simulation)
 
 
 def _check_against_mujoco(simulation, sensors):

@@ -7,26 +7,31 @@ import math
 
 import pytest
 import torch
+from mujoco.batch import SimulationError
 
 from mute.envs.batch_simulation import BatchSimulation
 from mute.envs.engines import make_simulation
-from mute.envs.scene import SceneCfg, build_scene
-from mute.envs.sensors import past_readings, sensor_slice
+from mute.envs.scene import SceneCfg, build_scene, make_spec
+from mute.envs.sensors import sensor_slice
 from mute.envs.simulation import Engine
 
 MODEL = build_scene(SceneCfg())
+_ARENA = 40_000
+"""Memory of a simulation, bytes."""
+
 LIVE = ("qpos", "qvel", "ctrl", "sensordata", "actuator_force")
 
 
-def _make_standing(num_envs=2, engine: Engine = "mjbatch"):
+def _make_standing(num_envs=2, engine: Engine = "mujoco"):
     """Make robots that hold the standing pose."""
     simulation = make_simulation(MODEL, num_envs, num_threads=1, engine=engine)
     simulation.reset(torch.ones(num_envs, dtype=torch.bool))
+    simulation.forward()
     simulation.ctrl[:] = simulation.qpos[:, 7:]
     return simulation
 
 
-@pytest.fixture(params=["mjbatch", "warp"])
+@pytest.fixture(params=["mujoco", "warp"])
 def make_standing(request):
     return functools.partial(_make_standing, engine=request.param)
 
@@ -131,6 +136,7 @@ def test_a_reset_puts_the_masked_robots_to_the_keyframe_and_touches_no_other(mak
         each.step(7)
     keyframe = torch.from_numpy(MODEL.key_qpos[0]).float()
     simulation.reset(torch.tensor([True, False]))
+    simulation.forward(torch.tensor([True, False]))
     assert torch.equal(simulation.qpos[0], keyframe)
     assert (simulation.qvel[0] == 0.0).all()
     _assert_same(_tensors(simulation, 1), _tensors(twin, 1))
@@ -139,12 +145,13 @@ def test_a_reset_puts_the_masked_robots_to_the_keyframe_and_touches_no_other(mak
     _assert_same(_tensors(simulation, 1), _tensors(twin, 1))
 
 
-def test_readings_are_current_after_a_reset(make_standing):
+def test_readings_are_current_after_a_reset_and_a_forward_pass(make_standing):
     simulation = make_standing()
     expected = simulation.sensordata.clone()
     simulation.ctrl += 0.3
     simulation.step(7)
     simulation.reset(torch.tensor([True, True]))
+    simulation.forward()
     assert torch.equal(simulation.sensordata, expected)
 
 
@@ -190,27 +197,32 @@ def test_a_simulation_stays_unstable_until_it_is_reset(tmp_path, monkeypatch):
     assert simulation.unstable().tolist() == [True, False]
 
 
-class _BatchThatRaises:
-    """Steps all simulations but the first, then raises, as the engine does on its own errors."""
-
-    def __init__(self, batch):
-        self._batch = batch
-
-    def __getattr__(self, name):
-        return getattr(self._batch, name)
-
-    def step(self, nstep):
-        ids = torch.ones(self._batch.num_sims, dtype=torch.bool)
-        ids[0] = False
-        self._batch.step(ids.numpy(), nstep=nstep)
-        raise RuntimeError("arena exhausted")
-
-
-def test_an_engine_error_is_an_unstable_simulation_and_stops_nothing(monkeypatch):
-    simulation, twin = _make_standing(), _make_standing()
-    assert isinstance(simulation, BatchSimulation)
-    monkeypatch.setattr(simulation, "_batch", _BatchThatRaises(simulation._batch))
+def _make_in_a_small_arena():
+    """Make two robots that stand, in memory that holds the contacts of their feet and few more."""
+    spec = make_spec(SceneCfg(), pictured=False)
+    spec.memory = _ARENA
+    simulation = BatchSimulation(spec.compile(), 2, num_threads=1)
+    simulation.reset(torch.ones(2, dtype=torch.bool))
+    simulation.ctrl[:] = simulation.qpos[:, 7:]
     simulation.step()
+    assert not simulation.unstable().any()
+    return simulation
+
+
+def test_lost_contacts_make_a_simulation_unstable(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    simulation = _make_in_a_small_arena()
+    simulation.qpos[1, 2] = 0.0
+    simulation.step()
+    assert simulation.unstable().tolist() == [False, True]
+
+
+def test_an_engine_error_is_an_unstable_simulation_and_stops_nothing():
+    simulation, twin = (_make_in_a_small_arena() for _ in range(2))
+    simulation.qpos[0, 2] = 0.1  # belly and legs in the ground: 16 contacts
+    simulation.step()
+    with pytest.raises(SimulationError, match="ncon = 16"):
+        simulation._batch.step(ids=[0])
     twin.step()
     assert simulation.unstable().tolist() == [True, False]
     _assert_same(_tensors(simulation, 1), _tensors(twin, 1))
@@ -270,24 +282,70 @@ def test_a_state_of_another_number_of_robots_is_refused(make_standing):
         make_standing(3).load_state_dict(make_standing(2).state_dict())
 
 
-@pytest.mark.parametrize("engine", ["mjbatch", "warp"])
-@pytest.mark.parametrize("samples", [1, 4])
-def test_one_call_keeps_what_each_of_its_steps_read(samples, engine):
-    model = build_scene(SceneCfg(), foot_samples=samples)
-    single, several = (make_simulation(model, 2, num_threads=1, engine=engine) for _ in range(2))
-    past = past_readings(several, "FR_foot_vel", 4)
-    assert past.shape == (samples, 2, 4, 3)
-    now = single.sensordata[:, sensor_slice(model, "FR_foot_vel", 4)]
-    for call in range(5):
-        read = []
-        for _ in range(samples):
-            single.step()
-            read.append(now.clone())
-        several.step(samples)
-        expected = torch.stack(read).view(samples, 2, 4, 3)
-        assert torch.equal(past, expected)
-        assert bool((expected != 0.0).any()) == (call > 0 or samples > 1)
+@pytest.mark.parametrize("num_steps", [1, 4])
+def test_one_call_records_what_each_of_its_steps_left(make_standing, num_steps):
+    single, several = make_standing(), make_standing()
+    several.record("sensordata", "qpos")
+    several.record("qpos", "actuator_force")
+    names = ("sensordata", "qpos", "actuator_force")
+    for call in range(4):
         for simulation in (single, several):
-            if call == 2:  # a ring of a simulation that begins anew begins anew as well
-                simulation.reset(torch.tensor([False, True]), keyframe=0)
-            simulation.forward()  # is no step, and leaves no reading
+            simulation.ctrl += 0.1
+        left: dict[str, list[torch.Tensor]] = {name: [] for name in names}
+        for _ in range(num_steps):
+            single.step()
+            for name in names:
+                left[name].append(getattr(single, name).clone())
+        several.step(num_steps)
+        assert set(several.substeps) == set(names)
+        for name, rows in left.items():
+            expected = torch.stack(rows, dim=1)
+            assert torch.equal(several.substeps[name].float(), expected), (call, name)
+            assert (expected != 0.0).any()
+            assert num_steps == 1 or not torch.equal(expected[:, 0], expected[:, -1])
+
+
+def test_what_is_recorded_follows_the_number_of_steps(make_standing):
+    simulation = make_standing(3)
+    simulation.record("qvel")
+    for num_steps in (2, 5, 2):
+        simulation.step(num_steps)
+        assert simulation.substeps["qvel"].shape == (3, num_steps, MODEL.nv)
+        assert torch.equal(simulation.substeps["qvel"][:, -1].float(), simulation.qvel)
+
+
+def test_what_is_written_to_one_robot_leaves_the_others_their_double_precision():
+    simulation, twin = (_make_standing(2) for _ in range(2))
+    for each in (simulation, twin):
+        each.ctrl += 0.2
+        each.step(5)
+    simulation.qvel[0, 0] += 0.5
+    simulation.qpos[0, 2] += 0.1
+    for each in (simulation, twin):
+        each.step()
+    state, other = (each.state_dict()["integration"] for each in (simulation, twin))
+    assert not torch.equal(state[0], other[0])
+    assert torch.equal(state[1], other[1])
+    assert not torch.equal(state[1], state[1].float().double())
+
+
+def test_positions_alone_make_the_sensors_of_positions_current():
+    simulation = _make_standing()
+    columns = sensor_slice(MODEL, "FR_foot_pos", 4)
+    before = simulation.sensordata[:, columns].clone()
+    simulation.qpos[:, 2] += 0.25
+    simulation.forward(torch.tensor([False, True]), "positions")
+    raised = simulation.sensordata[:, columns] - before
+    assert (raised[0] == 0.0).all()
+    torch.testing.assert_close(raised[1, 2::3], torch.full((4,), 0.25), atol=1e-6, rtol=0.0)
+
+
+def test_a_state_of_an_earlier_engine_is_refused_in_one_line():
+    simulation = _make_standing()
+    state = simulation.state_dict()
+    # It kept the readings of the last physics steps in its state as well.
+    history = torch.zeros(2, 100, dtype=torch.float64)
+    state["integration"] = torch.cat((state["integration"], history), dim=1)
+    with pytest.raises(ValueError, match=r"engine of an earlier version.*play and export") as error:
+        simulation.load_state_dict(state)
+    assert "\n" not in str(error.value)

@@ -38,6 +38,12 @@ def test_the_estimators_scale_of_heights_becomes_that_of_the_height_map():
     assert cfg.agent == make_task("go1_mute").agent
 
 
+def test_an_engine_that_is_gone_becomes_the_one_that_took_its_place():
+    plain = to_plain(make_task("go1_mute"))
+    plain["env"]["engine"] = "mjbatch"
+    assert from_plain(plain).env.engine == "mujoco"
+
+
 def test_weights_that_were_fields_become_the_terms_that_they_weighed():
     assert from_plain(_with_flat_rewards()) == make_task("go1_mute")
 

@@ -117,8 +117,9 @@ def test_the_power_is_the_integral_over_the_physics_steps_that_count():
     powers = []
 
     def record_power() -> None:
-        torque, velocity = env.simulation.actuator_force, env.simulation.qvel[:, 6:]
-        powers.append((torque * velocity).abs().sum(dim=1).tolist())
+        steps = env.simulation.substeps
+        torque, velocity = steps["actuator_force"], steps["qvel"][:, :, 6:]
+        powers.extend((torque * velocity).abs().sum(dim=2).T.tolist())
 
     env.physics_listeners.append(record_power)
     with listener:

@@ -63,7 +63,9 @@ def test_a_landing_has_the_effective_mass_of_the_pose_in_which_the_foot_lands():
     env = _make_env()
     recorder = Recorder(env)
     poses = []
-    env.physics_listeners.append(lambda: poses.append(env.simulation.qpos.numpy().astype(float)))
+    env.physics_listeners.append(
+        lambda: poses.extend(env.simulation.substeps["qpos"].transpose(0, 1).numpy().copy())
+    )
     env.simulation.qpos[:, 2] += 0.1
     _walk(env, 9)
     impacts = recorder.take().impacts

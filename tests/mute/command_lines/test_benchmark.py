@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import torch
 from bare_go1 import BareGo1
-from mjbatch import Batch
+from mujoco.batch import Batch
 
 from mute import tasks
 from mute.command_lines import benchmark
@@ -160,7 +160,7 @@ def test_a_peer_that_breaks_says_so(tmp_path, script, note):
 
 def test_the_robots_of_gymnasium_move_as_those_of_the_engine():
     cfg = make_task(DEFAULT_TASK).env
-    model = build_scene(cfg.scene, foot_samples=cfg.decimation)
+    model = build_scene(cfg.scene, pictured=False)
     batch = Batch(model, 1)
     ctrl, qpos = batch.bind("ctrl"), batch.bind("qpos")
     batch.reset(keyframe=model.key("stand").id)

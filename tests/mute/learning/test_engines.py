@@ -1,6 +1,6 @@
 """Tests that hold the two engines to each other, with the policy that ships, on the CPU.
 
-MuJoCo Warp computes in float32 and stops its solver at a tolerance of 1e-6, `mjbatch` in float64
+MuJoCo Warp computes in float32 and stops its solver at a tolerance of 1e-6, MuJoCo in float64
 and at 1e-8. A foot whose distance to the ground is within rounding of zero touches it a physics
 step earlier in one of them, and from there on the two robots differ by what such a step moves. So
 states are compared among the robots whose contacts agreed at every physics step, and figures among
@@ -20,13 +20,13 @@ from mute.checkpoint import CheckpointError
 from mute.controllers import LearnedController, load_policy
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.rewards import reward_term
-from mute.envs.sensors import past_readings, sensor_slice
+from mute.envs.sensors import sensor_slice
 from mute.envs.warp_simulation import WarpSimulation
 from mute.evaluation.gait import GaitMeter
 from mute.evaluation.trials import evaluation_cfg
 
 POLICY = load_policy(SHIPPED_POLICY)
-ENGINES = ("mjbatch", "warp")
+ENGINES = ("mujoco", "warp")
 
 
 def _make_env(engine, num_envs):
@@ -53,10 +53,11 @@ def _put_at_the_same(one, other):
 
 
 def _contacts(env):
-    """Return what all contact sensors found, at every physics step where they keep it."""
-    feet = past_readings(env.simulation, "FR_foot_contact", 4).transpose(0, 1)
-    links = env.simulation.sensordata[:, sensor_slice(env.model, "trunk_contact", 14)]
-    return torch.cat((feet.flatten(1), links), dim=1)
+    """Return what all contact sensors found at every physics step."""
+    columns = sensor_slice(env.model, "FR_foot_contact", 4)
+    links = sensor_slice(env.model, "trunk_contact", 14)
+    found = env.simulation.substeps["sensordata"].float()
+    return torch.cat((found[:, :, columns], found[:, :, links]), dim=2).flatten(1)
 
 
 TOLERANCES = {

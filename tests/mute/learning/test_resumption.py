@@ -17,7 +17,7 @@ from mute.learning.runner import MuteRunner
 from mute.tasks import make_task
 
 _OTHER_WORDS = {
-    "env.engine": "mjbatch",
+    "env.engine": "mujoco",
     "env.scene.integrator": "euler",
     "env.scene.cone": "elliptic",
     "env.scene.solver": "cg",

@@ -1,0 +1,34 @@
+"""Fields of the model that differ between simulations, saved and loaded by both engines alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import torch
+
+from .simulation import Simulation
+
+__all__ = ["load_fields", "saved_fields"]
+
+_PREFIX = "field/"
+
+
+def saved_fields(fields: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    """Return the entries of a `state_dict` that hold model fields.
+
+    Args:
+        fields: Fields by their names in MuJoCo. Shape of each: (num_envs, ...).
+    """
+    return {f"{_PREFIX}{name}": value.clone() for name, value in fields.items()}
+
+
+def load_fields(simulation: Simulation, state: Mapping[str, torch.Tensor]) -> None:
+    """Write the model fields of a `state_dict`; `set_const` is the caller's to call.
+
+    Args:
+        simulation: The engine that they are written to.
+        state: A `state_dict` of an engine of that kind.
+    """
+    for key, value in state.items():
+        if key.startswith(_PREFIX):
+            simulation.field(key.removeprefix(_PREFIX)).copy_(value)
