@@ -35,7 +35,7 @@ from mute.command_lines.arguments import (
     parse,
     task_name,
 )
-from mute.command_lines.benchmark_peers import peer_names, time_peer
+from mute.command_lines.benchmark_peers import PEER_COLUMNS, peer_names, peer_pythons, time_peers
 from mute.envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
 from mute.evaluation.tables import print_table, write_json
 from mute.learning.runner import MuteRunner
@@ -65,13 +65,18 @@ class BenchmarkArgs:
     rollouts: int = 5
     """Turns, each a rollout of every part; the medians count."""
     peers: Words = ()
-    """Other simulations of a Go1 to time on the CPU as well: all, or some of gymnasium, mjlab and
-    mujoco_playground; none if not given. The last two step as many robots as the smallest of
-    --num-envs, after minutes of compiling. One that is not installed is told as such."""
+    """Other simulations to time on the CPU as well, in turns with this one: all, or some of
+    gymnasium, mjlab, mujoco_playground and unilab; none if not given. All but gymnasium step as
+    many robots as the smallest of --num-envs, after minutes of compiling, and are trained by their
+    own loops. One that is not installed is told as such."""
+    peers_from: Path | None = None
+    """Folder with their virtual environments, which `python -m benchmarks.make_peers` makes."""
     mjlab_python: Path | None = None
-    """Python interpreter of the virtual environment that has mjlab; this one if not given."""
+    """Python interpreter that has mjlab, if that is elsewhere; this one if neither is given."""
     playground_python: Path | None = None
     """Python interpreter that has MuJoCo Playground (package playground), likewise."""
+    unilab_python: Path | None = None
+    """Python interpreter that has UniLab, likewise."""
     json: bool = False
     """Print JSON and nothing else."""
     out: Path | None = None
@@ -184,15 +189,23 @@ def main(argv: Sequence[str] | None = None) -> int:
         print_table(f"control steps/s, {content['machine']}", rows, list(rows[0]))
         if peer_rows:
             shown = [{k: "-" if v is None else v for k, v in row.items()} for row in peer_rows]
-            print_table("peers, control steps/s", shown, list(shown[0]))
+            print_table("peers, control steps/s", shown, list(PEER_COLUMNS))
     return 0
 
 
 def _peer_rows(args: BenchmarkArgs, peers: Sequence[str]) -> list[dict[str, Any]]:
-    pythons = {"mjlab": args.mjlab_python, "mujoco_playground": args.playground_python}
-    shape = (min(args.num_envs), args.rollouts, args.task)
-    names = peers if args.json or not peers else track(peers, "peers")
-    return [dataclasses.asdict(time_peer(name, pythons.get(name), *shape)) for name in names]
+    if not peers:
+        return []
+    given = {
+        "mjlab": args.mjlab_python,
+        "mujoco_playground": args.playground_python,
+        "unilab": args.unilab_python,
+    }
+    pythons = peer_pythons(peers, args.peers_from, given)
+    rounds, robots = args.rollouts, min(args.num_envs)
+    return [
+        dataclasses.asdict(rate) for rate in time_peers(peers, pythons, robots, rounds, args.task)
+    ]
 
 
 def _rates_apart(task: str, num_envs: int, rollouts: int) -> dict[str, float]:

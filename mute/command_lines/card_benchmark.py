@@ -25,9 +25,14 @@ _RATES = {
 _PEERS = {
     "name": ("peer", "{}"),
     "version": ("version", "{}"),
+    "engine": ("engine", "{}"),
+    "robot": ("robot", "{}"),
+    "task": ("task", "{}"),
+    "physics": ("a control step", "{}"),
     "num_envs": ("environments", "{}"),
-    "steps_per_second": ("control steps/s", "{:,.0f}"),
-    "note": ("what it steps", "{}"),
+    "environment": ("environment alone", "{}"),
+    "loop": ("whole training loop", "{}"),
+    "note": ("note", "{}"),
 }
 _PARTS = {
     "name": ("part", "{}"),
@@ -98,14 +103,41 @@ def _training(files: BenchmarkFiles) -> str:
 
 def _peers(files: BenchmarkFiles) -> str:
     return (
-        "## Other simulations of a Go1 on the CPU\n\n"
-        "`python -m mute.benchmark --peers all --mjlab-python PYTHON --playground-python PYTHON` "
-        "times them after that. Each but the first has a robot and a task of its own. On "
+        "## Other simulations on the CPU\n\n"
+        "`python -m benchmarks.make_peers --into DIR` makes their environments, and `python -m "
+        "mute.benchmark --peers all --peers-from DIR` times them in turns with MUTE itself: the "
+        "environment alone, and their own training loops, all of an iteration, without what is "
+        "compiled before. Medians over rounds, in brackets the 95 % interval where there are six "
+        "or more. mjlab, MuJoCo Playground and UniLab have robots and tasks of their own. On "
         f"{files.first['machine']}, beside the older run above (`docs/benchmark.json`):\n\n"
-        f"{markdown(files.first['peers'], _PEERS)}\n\n"
+        f"{_peer_table(files.first['peers'])}\n\n"
         f"On {files.peers['machine']} (`docs/peers.json`):\n\n"
-        f"{markdown(files.peers['peers'], _PEERS)}"
+        f"{_peer_table(files.peers['peers'])}"
     )
+
+
+def _peer_table(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return peers with intervals and shares of MUTE's rate, as far as a file knows them."""
+    return markdown([_peer_cells(row) for row in rows], _PEERS)
+
+
+def _peer_cells(row: Mapping[str, Any]) -> dict[str, Any]:
+    cells = {name: row.get(name) for name in _PEERS}
+    if row.get("decimation") is not None:
+        cells["physics"] = f"{row['decimation']} x {1000 * row['physics_step']:g} ms"
+    return cells | {part: _peer_rate(row, part) for part in ("environment", "loop")}
+
+
+def _peer_rate(row: Mapping[str, Any], part: str) -> str | None:
+    """Return a rate as in "1,234 [1,200, 1,300], 12% of mute"."""
+    if row.get(part) is None:
+        return None
+    told = f"{row[part]:,.0f}"
+    low, high = row.get("intervals", {}).get(part, (None, None))
+    if low is not None and high is not None:
+        told += f" [{low:,.0f}, {high:,.0f}]"
+    share = row.get("over_mute", {}).get(part)
+    return told if share is None or row["name"] == "mute" else f"{told}, {share:.0%} of mute"
 
 
 def _sound(files: BenchmarkFiles) -> str:
