@@ -22,6 +22,14 @@ def test_the_first_value_that_is_not_finite_is_named():
     assert first_not_finite({"one": torch.zeros(2), "flags": torch.ones(3).bool()}) is None
 
 
+def test_infinities_that_cancel_out_are_found_and_large_numbers_are_finite():
+    assert first_not_finite({"both": torch.tensor([math.inf, 1.0, -math.inf])}) == "both"
+    large = torch.full((4,), 3.0e38)
+    assert not large.sum().isfinite()
+    assert first_not_finite({"large": large}) is None
+    assert first_not_finite({"large": large, "none": torch.tensor([math.nan])}) == "none"
+
+
 def _spoil_after_update(runner: MuteRunner, monkeypatch, at: int, change) -> None:
     """Call `change(losses)` when PPO has made its update number `at`, from 0."""
     update, done = PPO.update, []
