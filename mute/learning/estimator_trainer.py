@@ -41,7 +41,7 @@ class Labels:
 
     def select(self, env_ids: Tensor) -> Labels:
         """Return the labels of some environments."""
-        return Labels(**{name: value[:, env_ids] for name, value in vars(self).items()})
+        return Labels(**{key: value.index_select(1, env_ids) for key, value in vars(self).items()})
 
 
 @dataclass
@@ -218,7 +218,10 @@ class EstimatorTrainer:
         for env_ids in batches:
             state = (past["hidden"][env_ids], past["cell"][env_ids])
             estimate, _ = self.estimator.unroll(
-                past["obs"][:, env_ids], state, starts[:, env_ids], sample=True
+                past["obs"].index_select(1, env_ids),
+                state,
+                starts.index_select(1, env_ids),
+                sample=True,
             )
             decoded = self.estimator.decode(estimate.latent)
             chosen = labels.select(env_ids)
