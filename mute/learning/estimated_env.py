@@ -113,8 +113,10 @@ class EstimatedEnv(VecEnv):
         observations, rewards, dones, extras = self.env.step(actions.to(self.env.device))
         use_learning_threads()
         ended = dones.to(self.device).unsqueeze(1)
-        hidden, cell = self.state
-        self._consume(observations, (hidden.masked_fill(ended, 0.0), cell.masked_fill(ended, 0.0)))
+        state = self.state
+        if bool(ended.any()):
+            state = (state[0].masked_fill(ended, 0.0), state[1].masked_fill(ended, 0.0))
+        self._consume(observations, state)
         return self._observations, rewards, dones, extras
 
     @torch.inference_mode()
