@@ -12,6 +12,7 @@ from pathlib import Path
 
 from mute.command_lines.arguments import command_line, make_directory, parse
 from mute.command_lines.card_benchmark import BenchmarkFiles, benchmark_page
+from mute.command_lines.card_reliability import read_seeds
 from mute.command_lines.card_results import ResultFiles, results_page
 from mute.evaluation.tables import read_json
 from mute.support.errors import MuteError
@@ -33,6 +34,9 @@ class CardArgs:
     """Card of the policy, that `mute.release` wrote."""
     noise: Path = _DOCS / "noise" / "noise.json"
     """File that `evaluate.py noise` wrote; those of the sweeps and of the walk lie beside it."""
+    reliability: Path = _DOCS / "reliability"
+    """Directory of what `evaluate.py reliability` wrote of several seeds, as seed0.json, seed1.json
+    and so on, with what `evaluate.py progress` wrote of each as seed0_progress.json."""
     benchmark: Path = _DOCS / "benchmark.json"
     """File that `mute.benchmark --out` wrote; those of other machines lie beside it."""
     out: Path | None = None
@@ -65,7 +69,7 @@ def read_results(args: CardArgs) -> ResultFiles:
     """Read the files that the results are in.
 
     Raises:
-        MuteError: If one is missing.
+        MuteError: If one is missing, or not what the command wrote.
     """
     beside = args.noise.parent
     return ResultFiles(
@@ -81,6 +85,7 @@ def read_results(args: CardArgs) -> ResultFiles:
         sweep_speed=_read(beside / "sweep_speed.json"),
         sweep_beta=_read(beside / "sweep_beta.json"),
         walk=_read(beside / "walk.json"),
+        reliability=read_seeds(args.reliability),
     )
 
 

@@ -6,11 +6,12 @@ A function a section; figures in sentences are computed from the files, like tho
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from mute.command_lines.card_reliability import SeedFiles, reliability_section
 from mute.command_lines.card_tables import markdown, mean_and_spread, spread_of_trials, times
 from mute.evaluation.paper_levels import PAPER_LEVELS, PAPER_MNL_AT_08, PAPER_WALK
 
@@ -98,6 +99,8 @@ class ResultFiles:
     sweep_speed: Sequence[Mapping[str, Any]]
     sweep_beta: Sequence[Mapping[str, Any]]
     walk: Mapping[str, Any]
+    reliability: Mapping[int, SeedFiles] = field(default_factory=dict)
+    """Of trainings by their seeds; without any, the page says nothing of it."""
 
     @property
     def all_trainings(self) -> dict[str, Mapping[str, Any]]:
@@ -112,6 +115,7 @@ def results_page(files: ResultFiles) -> str:
         _head(),
         f"## Over four trainings\n\n{summary(files)}",
         _trainings(files),
+        *([reliability_section(files.reliability)] if files.reliability else []),
         _policy(files),
         _noise(files),
         _paper_task(files),

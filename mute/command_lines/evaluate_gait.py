@@ -87,7 +87,15 @@ def progress(args: ProgressArgs) -> None:
         steps = round(args.seconds / env.step_dt)
         meter = run_trial(env, LearnedController(policy, env.num_envs), draw.command, steps)
         error, falls = meter.gait().velocity_error_sq, meter.gait().fall_rate
-        milestone = Milestone(policy.iteration, minutes, error, falls, walks(error, falls))
+        trained = policy.cfg.env.num_envs * policy.cfg.agent.num_steps_per_env
+        milestone = Milestone(
+            iteration=policy.iteration,
+            steps=(policy.iteration + 1) * trained,
+            minutes=minutes,
+            velocity_error_sq=error,
+            fall_rate=falls,
+            walks=walks(error, falls),
+        )
         rows.append(dataclasses.asdict(milestone))
         if milestone.walks:
             break

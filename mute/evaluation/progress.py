@@ -20,6 +20,8 @@ class Milestone:
 
     iteration: int
     """Last finished iteration."""
+    steps: int
+    """Control steps of all robots until then."""
     minutes: float
     """Time trained until then, min."""
     velocity_error_sq: float

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from learning_helpers import make_runner
+from learning_helpers import NUM_ENVS, NUM_STEPS, make_runner
 
 from mute.checkpoint import save_checkpoint
 from mute.command_lines import evaluate
@@ -60,6 +60,7 @@ def test_progress_measures_the_checkpoints_of_a_run_in_their_order(tmp_path):
     assert evaluate.main([*arguments, "--out", str(out)]) == 0
     rows = read_json(out / "progress.json")["checkpoints"]
     assert [row["iteration"] for row in rows] == [0, 1]
+    assert [row["steps"] for row in rows] == [NUM_ENVS * NUM_STEPS, 2 * NUM_ENVS * NUM_STEPS]
     assert 0.0 < rows[0]["minutes"] < rows[1]["minutes"]
     assert not any(row["walks"] for row in rows)  # nothing walks after two iterations
 
