@@ -1,0 +1,51 @@
+"""How far a median can be trusted."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from scipy.stats import quantile_test
+
+__all__ = ["LEVEL", "MedianInterval", "median_interval"]
+
+LEVEL = 0.95
+"""Confidence level of an interval."""
+
+
+@dataclass(frozen=True)
+class MedianInterval:
+    """A median and the interval that holds the true one at the level `LEVEL` or above."""
+
+    median: float
+    """Median of the values."""
+    low: float | None
+    """Lower bound; None of fewer than six values, which are too few for any interval."""
+    high: float | None
+    """Upper bound; likewise."""
+
+    @property
+    def half_width(self) -> float:
+        """Half the interval's width as a share of the median; infinite where there is none."""
+        if self.low is None or self.high is None:
+            return math.inf
+        return 0.5 * (self.high - self.low) / self.median
+
+
+def median_interval(values: Sequence[float]) -> MedianInterval:
+    """Return the median of some values and its distribution-free confidence interval.
+
+    The interval goes from the k-th smallest value to the k-th largest one. It holds the true median
+    unless fewer than k values lie on one side of it, and how many do is binomial with p = 1/2; k is
+    the largest for which that is improbable enough (Conover, Practical Nonparametric Statistics,
+    3.2; `scipy.stats.quantile_test`). So it asks nothing of how values are distributed, but that
+    one says nothing of the next.
+
+    Args:
+        values: Positive, one or more.
+    """
+    bounds = quantile_test(values, p=0.5).confidence_interval(confidence_level=LEVEL)
+    low, high = (None if math.isnan(bound) else float(bound) for bound in bounds)
+    return MedianInterval(statistics.median(values), low, high)

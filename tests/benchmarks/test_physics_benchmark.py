@@ -1,0 +1,51 @@
+"""Tests of the benchmark of the physics, on rollouts as short as can be."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from benchmarks import physics as benchmark
+from mute.support.errors import MuteError
+
+
+def test_it_compares_every_variant_with_the_scene_as_it_is(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(benchmark, "_WARM_UP", 2)
+    monkeypatch.setattr(benchmark, "_STEPS", 2)
+    monkeypatch.setattr(benchmark, "_FIDELITY_ROBOTS", 1)
+    monkeypatch.setattr(benchmark, "_FIDELITY_SECONDS", 1.6)
+    out = tmp_path / "new" / "physics.json"
+    arguments = ["--num-envs", "3", "--turns", "6", "--json", "--out", str(out)]
+    assert benchmark.main(arguments) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert json.loads(out.read_text()) == content
+    rates = {row["variant"]: row for row in content["rates"]}
+    assert list(rates) == [variant.name for variant in benchmark.VARIANTS]
+    reference = rates.pop("as it is")
+    assert (reference["speed"], reference["speed_low"], reference["speed_high"]) == (1.0, 1.0, 1.0)
+    for row in rates.values():
+        assert 0.0 < row["speed_low"] <= row["speed"] <= row["speed_high"]
+    walked = {row["variant"] for row in content["fidelity"]}
+    assert walked < set(rates) | {"as it is"}
+    # Half as many steps, of twice the length, are still the same walk.
+    longer = [row for row in content["fidelity"] if row["variant"].startswith("2 steps")]
+    assert [row["beta"] for row in longer] == [0.0, 1.0]
+    assert all(0.0 < abs(row["force_rms"]) < 0.05 for row in longer)
+    touching = {row["shape"]: row for row in content["touching"]}
+    assert touching["foot"]["policy"] == 1.0
+    assert 0.0 <= touching["shank"]["beginning"] <= 1.0
+
+
+def test_every_variant_changes_what_it_names():
+    changed = {
+        variant.name: (variant.cfg is not benchmark.AS_IT_IS.cfg, variant.spec, variant.pictured)
+        for variant in benchmark.VARIANTS[1:]
+    }
+    assert all(any(parts) for parts in changed.values())
+
+
+@pytest.mark.parametrize("option", ["--num-envs", "--turns"])
+def test_a_number_that_cannot_be_is_refused(option):
+    with pytest.raises(MuteError, match=option):
+        benchmark.main([option, "0"])
