@@ -30,6 +30,8 @@ _MODULES = {
     "-m mute.benchmark": "mute.command_lines.benchmark",
     "-m mute.release": "mute.command_lines.release",
     "-m mute.card": "mute.command_lines.card",
+    "-m benchmarks.make_peers": "benchmarks.make_peers",
+    "-m benchmarks.peer_walks": "benchmarks.peer_walks",
     "-m benchmarks.sound": "benchmarks.sound",
     "examples/run_onnx.py": "run_onnx",
     "examples/side_by_side.py": "side_by_side",
