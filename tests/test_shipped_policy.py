@@ -11,8 +11,9 @@ from tensordict import TensorDict
 
 from mute.controllers import LearnedController, load_policy
 from mute.envs.quadruped_env import QuadrupedEnv
+from mute.evaluation.reliability.starts import starts_of
 from mute.evaluation.tables import read_json
-from mute.evaluation.trials import evaluation_cfg, run_trial
+from mute.evaluation.trials import evaluation_cfg, from_the_stance, run_trial
 
 RESOURCES = REPOSITORY / "resources" / "go1"
 
@@ -46,6 +47,14 @@ def test_beta_lowers_the_landing_speed_and_the_feet_still_lift(gaits):
     loud, quiet = gaits
     assert quiet.landing_speed_mean < 0.8 * loud.landing_speed_mean
     assert min(loud.apex_mean, quiet.apex_mean) > 0.02
+
+
+def test_told_to_turn_from_the_exact_stance_it_goes_at_every_beta(policy):
+    cfg = evaluation_cfg(policy.cfg.env, 3, 10.0, seed=0)
+    env = QuadrupedEnv(from_the_stance(cfg))
+    rows = starts_of(env, LearnedController(policy, 3), lambda work: None)
+    turning = [row for row in rows if row.command == "0.6 rad/s turning"]
+    assert [(row.beta, row.share) for row in turning] == [(0.0, 1.0), (0.5, 1.0), (1.0, 1.0)]
 
 
 @pytest.fixture(scope="module")

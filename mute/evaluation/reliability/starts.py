@@ -1,6 +1,8 @@
 """Whether robots that stand begin to walk when they are told to.
 
-They stand for `STAND_TIME` at the command zero, then a command comes. A robot *goes* if within
+They begin in the exact stance, at rest, as a user's robot does: of what first states stir up, a
+robot may still be marching when the command comes. They stand for `STAND_TIME` at the command zero,
+then it comes. A robot *goes* if within
 `DEADLINE` the mean over half a second of its velocity along the command reached `GOING_SHARE` of
 what is asked; if over the last second of the trial, which ends half a second after the deadline, it
 is still as fast; and if it did not fall, standing or going. The end of the first such half second
@@ -97,18 +99,18 @@ def going_times(progress: torch.Tensor, ended: torch.Tensor, step_dt: float) -> 
 
 
 def measure_starts(policy: Policy, robots: int, seed: int, on_work: OnWork) -> PartResult:
-    """Start randomised robots with noisy sensors, and the exact one from the exact stance.
+    """Start randomised robots with noisy sensors, and the exact robot with exact sensors.
 
     Args:
         policy: What walks, `under_conditions`.
         robots: Robots for each command and beta.
-        seed: Of physics, first states and noise.
+        seed: Of physics and noise.
         on_work: Is told of the work that is done.
     """
     seconds = STAND_TIME + TRIAL_TIME
     controller = LearnedController(policy, robots * len(BETAS))
-    env = make_env(randomized_cfg(policy, controller.num_envs, seconds, seed))
-    randomized = starts_of(env, controller, on_work)
+    cfg = from_the_stance(randomized_cfg(policy, controller.num_envs, seconds, seed))
+    randomized = starts_of(make_env(cfg), controller, on_work)
     one_each = LearnedController(policy, len(BETAS))
     nominal_cfg = evaluation_cfg(policy.cfg.env, one_each.num_envs, seconds, seed)
     nominal = starts_of(make_env(from_the_stance(nominal_cfg)), one_each, on_work)

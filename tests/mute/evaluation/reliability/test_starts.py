@@ -12,6 +12,7 @@ from standing import Standing
 
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.reliability import starts
+from mute.evaluation.reliability.conditions import under_conditions
 from mute.evaluation.reliability.starts import COMMANDS, going_times, starts_of
 from mute.evaluation.trials import evaluation_cfg, from_the_stance
 
@@ -105,3 +106,26 @@ def test_a_robot_that_only_stands_starts_on_no_command(stand):
     ]
     assert all((row.robots, row.share) == (1, 0.0) for row in rows)
     assert all(math.isnan(row.seconds) for row in rows)
+
+
+def test_randomised_robots_begin_in_the_exact_stance_that_their_sensors_see_with_noise(
+    monkeypatch,
+):
+    made: list[_Notes] = []
+
+    def make(policy, robots):
+        made.append(_Notes(robots))
+        return made[-1]
+
+    monkeypatch.setattr(starts, "LearnedController", make)
+    monkeypatch.setattr(starts, "STAND_TIME", 0.1)
+    monkeypatch.setattr(starts, "TRIAL_TIME", 0.6)
+    policy = under_conditions(make_random_policy())
+    result = starts.measure_starts(policy, 4, 0, lambda work: None)
+    randomized, exact = made
+    assert (randomized.num_envs, exact.num_envs) == (12, 3)
+    joints = randomized.shown[0][:, 6:18]
+    assert 0.0 < float(joints.abs().max()) <= 0.0101  # of a state near the stance: 0.1
+    torch.testing.assert_close(exact.shown[0][:, 6:30], torch.zeros(3, 24))
+    assert [row["robots"] for row in result.tables["starts"]] == [4] * 24
+    assert [figure.value for figure in result.figures] == [0.0] * 6
