@@ -212,9 +212,11 @@ class Estimator(nn.Module):
                 f"got {starts.dtype} of shape {tuple(starts.shape)}"
             )
         hiddens = []
-        for step_obs, start in zip(obs, starts.unsqueeze(-1), strict=True):
-            hidden, cell = (part.masked_fill(start, 0.0) for part in state)
-            state = self.lstm(step_obs, (hidden, cell))
+        some_start = starts.any(dim=1).tolist()
+        for step_obs, start, some in zip(obs, starts.unsqueeze(-1), some_start, strict=True):
+            if some:
+                state = (state[0].masked_fill(start, 0.0), state[1].masked_fill(start, 0.0))
+            state = self.lstm(step_obs, state)
             hiddens.append(state[0])
         return self._heads(torch.stack(hiddens), sample, generator), state
 
