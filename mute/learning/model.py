@@ -12,6 +12,7 @@ from torch import nn
 
 from mute.learning.normalization import RunningNormalization
 from mute.networks.reflection import Reflection, tie_mlp, tie_vector
+from mute.support.precision import hidden_dtype, hidden_layers
 
 __all__ = ["PreparedModel"]
 
@@ -71,13 +72,29 @@ class PreparedModel(MLPModel):
         the distribution, and leaves the sample unused.
         """
         ready = obs.get(self.prepared_group, None)
-        if ready is None:
-            return super().forward(obs, masks, hidden_state, stochastic_output)
-        output = self.mlp(ready)
+        output = self._output(self.get_latent(obs, masks, hidden_state) if ready is None else ready)
         if self.distribution is None:
             return output
+        if ready is None and not stochastic_output:
+            return self.distribution.deterministic_output(output)
         self.distribution.update(output)
-        return self.output_mean
+        return self.distribution.sample() if ready is None else self.output_mean
+
+    def prepared(self, obs: TensorDict) -> torch.Tensor:
+        """Return the input ready made, as `prepared_group` holds it.
+
+        Shape: (num_samples, obs_dim).
+        """
+        latent = self.get_latent(obs)
+        return latent.to(hidden_dtype(latent.device))
+
+    def _output(self, latent: torch.Tensor) -> torch.Tensor:
+        """Return the perceptron's output; its hidden layers may compute in bfloat16."""
+        *hidden, last = self.mlp
+        with hidden_layers(latent.device):
+            for layer in hidden:
+                latent = layer(latent)
+        return last(latent.to(next(last.parameters()).dtype))
 
     def update_normalization(self, obs: TensorDict) -> None:
         """Learn the input's mean and variance, those of its mirror image included if tied."""

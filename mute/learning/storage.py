@@ -58,5 +58,5 @@ class PreparedStorage(RolloutStorage):
 
     @torch.no_grad()
     def _prepared(self, observations: TensorDict) -> TensorDict:
-        inputs = {model.prepared_group: model.get_latent(observations) for model in self.models}
+        inputs = {model.prepared_group: model.prepared(observations) for model in self.models}
         return TensorDict(inputs, batch_size=observations.batch_size)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import pytest
 import torch
 from learning_helpers import (
     NUM_ENVS,
@@ -12,6 +13,7 @@ from learning_helpers import (
     clone_tree,
     make_runner,
 )
+from quick_products import use_bfloat16
 from rsl_rl.algorithms import PPO
 from rsl_rl.storage import RolloutStorage
 
@@ -108,7 +110,10 @@ def test_an_update_learns_from_all_samples_but_those_over_as_its_help_says():
         assert len(learnt.unique()) == len(learnt) > NUM_ENVS * NUM_STEPS - parts
 
 
-def test_the_first_ratio_of_every_update_is_one(monkeypatch):
+@pytest.mark.parametrize("quick", [False, True])
+def test_the_first_ratio_of_every_update_is_one(monkeypatch, quick):
+    if quick:
+        use_bfloat16(monkeypatch)
     runner = make_runner(iterations=3)
     alg = runner.alg
     ratios: list[list[float]] = []
@@ -268,7 +273,7 @@ def test_networks_act_on_all_cores_and_the_engine_has_them_to_itself(monkeypatch
     monkeypatch.setattr(env, "step", spied_step)
     monkeypatch.setattr(runner.env.estimator, "step", spied_estimate)
     for model in (runner.alg.actor, runner.alg.critic):
-        model.mlp.register_forward_hook(lambda *_: networks.add(torch.get_num_threads()))
+        model.mlp[0].register_forward_hook(lambda *_: networks.add(torch.get_num_threads()))
     try:
         runner.train()
     finally:

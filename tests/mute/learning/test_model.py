@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 import torch
+from quick_products import use_bfloat16
 from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 
@@ -106,3 +107,44 @@ def test_what_rsl_rl_exports_says_what_the_model_does():
     scripted: Any = torch.jit.script(model.as_jit())
     for exported in (scripted, model.as_onnx(verbose=False)):
         torch.testing.assert_close(exported(obs["policy"]), model(obs))
+
+
+def _make_critic():
+    torch.manual_seed(0)
+    obs = TensorDict({"policy": torch.randn(200, 10)}, batch_size=200)
+    sizes = {"output_dim": 2, "hidden_dims": (32, 16), "obs_normalization": True}
+    return obs, PreparedModel(obs, {"critic": ["policy"]}, "critic", **sizes)
+
+
+def test_hidden_layers_compute_in_bfloat16_and_the_last_one_in_float32(monkeypatch):
+    obs, critic = _make_critic()
+    use_bfloat16(monkeypatch)
+    seen = []
+    for layer in (layer for layer in critic.mlp if isinstance(layer, torch.nn.Linear)):
+        layer.register_forward_hook(lambda _layer, _inputs, output: seen.append(output.dtype))
+    assert critic(obs).dtype == torch.float32
+    assert seen == [torch.bfloat16, torch.bfloat16, torch.float32]
+
+
+def test_in_bfloat16_outputs_and_gradients_are_those_of_float32_within_its_rounding(monkeypatch):
+    obs, critic = _make_critic()
+    outputs, gradients = [], []
+    for prepare in (lambda _: None, use_bfloat16):
+        prepare(monkeypatch)
+        output = critic(obs)
+        loss = (output - 1.0).square().mean()
+        outputs.append(output.detach())
+        gradients.append(torch.autograd.grad(loss, list(critic.parameters())))
+    # bfloat16 keeps 8 bits, so that a value is off by 2^-9 at most; three layers add up.
+    assert 0.0 < (outputs[0] - outputs[1]).abs().max() < 0.02 * outputs[0].abs().max()
+    for exact, rounded in zip(*gradients, strict=True):
+        assert rounded.dtype == torch.float32
+        assert (exact - rounded).norm() < 0.02 * exact.norm()
+
+
+def test_an_input_ready_made_gives_what_the_observations_give_in_bfloat16(monkeypatch):
+    obs, critic = _make_critic()
+    use_bfloat16(monkeypatch)
+    ready = TensorDict({critic.prepared_group: critic.prepared(obs)}, batch_size=200)
+    assert ready[critic.prepared_group].dtype == torch.bfloat16
+    torch.testing.assert_close(critic(ready), critic(obs), rtol=0.0, atol=1e-6)
