@@ -20,7 +20,8 @@ _MOST_WORKERS = 8
 _LONGEST = (
     *("test_video.py", "test_distributed.py", "test_engines.py", "test_filmed_evaluations.py"),
     *("test_resume.py", "test_lost_work.py", "test_programs.py", "test_runner.py"),
-    *("test_benchmark.py", "test_sound_benchmark.py", "test_gym_making.py"),
+    *("test_benchmark.py", "test_benchmark_turns.py", "test_sound_benchmark.py"),
+    *("test_gym_making.py",),
 )
 """Files that take longest. They come first, so that no process is alone with one at the end."""
 

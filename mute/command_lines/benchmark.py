@@ -1,57 +1,73 @@
 """Measure the speed of training, part by part: python -m mute.benchmark.
 
-Every part is timed in one process and in turns with the bare engine, and compared with its rollout
-of the same turn, so that a machine whose speed drifts does not favour one of them: a share is the
-median over turns, not the quotient of two rates. A training begins, with less noise than usual.
-Engine and environment then do each of its rollouts again, alone, with the same robots from the same
-states with the same actions: what kneels, carries more or rubs takes longer to simulate, whatever
-steps it. How fast the engine is with nominal robots that stand is told beside. Each size runs in a
-process of its own, for its memory.
+A training is timed in a process of its own, and so are the engine and the environment in it, which
+do each rollout of the training again alone. Every figure is a median over turns with the interval
+that holds the true one, and turns go on until the intervals of the ratios are as narrow as asked
+for. `--against` names an environment with another version of MUTE: both take turns on the machine,
+which only so can be compared. What each part is stands in `benchmark_figures`, how turns are taken
+in `benchmark_turns`; `--until-walking` is `benchmark_walking`'s.
 `--peers` times other ways to step a Go1 after that, see `mute.command_lines.benchmark_peers`.
 """
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
-import statistics
-import time
-from collections.abc import Callable, Sequence
+import math
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import torch
-from mujoco.batch import Batch
-from rich.progress import track
-from rsl_rl.algorithms import PPO
-from rsl_rl.utils import check_nan
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from mute.command_lines.arguments import (
     Words,
     check_distinct,
     check_option,
+    check_seed,
     command_line,
     parse,
     task_name,
 )
+from mute.command_lines.benchmark_figures import (
+    CAPTIONS,
+    MIN_TURNS,
+    PARTS,
+    comparison,
+    figures_of,
+    is_precise,
+    shortfall,
+    widest,
+    with_interval,
+)
 from mute.command_lines.benchmark_peers import PEER_COLUMNS, peer_names, peer_pythons, time_peers
-from mute.envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
+from mute.command_lines.benchmark_turns import (
+    THIS,
+    Times,
+    Version,
+    Worker,
+    other_version,
+    take_turns,
+)
+from mute.command_lines.benchmark_walking import time_to_walk
 from mute.evaluation.tables import print_table, write_json
-from mute.learning.runner import MuteRunner
 from mute.support.errors import MuteError
-from mute.support.memory import keep_freed_memory
-from mute.support.plugins import load_plugins
-from mute.support.processes import call_apart, peak_memory_mb
 from mute.support.provenance import machine_kind
 from mute.support.ranges import Range
-from mute.support.threads import use_collection_threads, use_learning_threads
 from mute.tasks import DEFAULT_TASK, make_task
 
-__all__ = ["BenchmarkArgs", "Rates", "measure"]
-
-_ACTION_STD = 0.4
-"""Standard deviation of the actions that the training begins with."""
+__all__ = ["BenchmarkArgs", "main"]
 
 
 @dataclass
@@ -60,10 +76,24 @@ class BenchmarkArgs:
 
     task: str = DEFAULT_TASK
     """Task to measure; `module:task` imports a module of yours first, which registers it."""
-    num_envs: tuple[int, ...] = (256, 1024, 4096, 8192, 16384)
+    num_envs: tuple[int, ...] = (1024, 4096)
     """Numbers of environments."""
-    rollouts: int = 5
-    """Turns, each a rollout of every part; the medians count."""
+    precision: float = 0.03
+    """Turns go on until half the 95 % interval of each ratio's median is within this share of
+    it."""
+    max_turns: int = 100
+    """The most turns of each number of environments; what is not precise by then is told so."""
+    rollouts: int | None = None
+    """Exactly so many turns, however precise; a turn is a rollout of every part."""
+    seed: int = 0
+    """Seed of the order of the parts within a turn."""
+    against: str | None = None
+    """PYTHON[:CHECKOUT]: the interpreter of an environment with another version of MUTE to compare
+    with in the same turns, and the top of that version's tree unless it is installed there."""
+    until_walking: bool = False
+    """Instead of parts, time whole trainings until each first walks."""
+    seeds: tuple[int, ...] = (0, 1, 2)
+    """Seeds of the trainings of --until-walking."""
     peers: Words = ()
     """Other simulations to time on the CPU as well, in turns with this one: all, or some of
     gymnasium, mjlab, mujoco_playground and unilab; none if not given. All but gymnasium step as
@@ -83,114 +113,148 @@ class BenchmarkArgs:
     """File to write the JSON to as well."""
 
 
-@dataclass
-class Rates:
-    """Control steps a second, environments times steps, of each part of training."""
-
-    num_envs: int
-    """Number of environments."""
-    rollouts: int
-    """Turns that were timed."""
-    engine: float
-    """MuJoCo alone: the physics steps of a control step in one call, of the training's robots."""
-    nominal_engine: float
-    """The same of robots without randomisation that stand, shaken by noise."""
-    environment: float
-    """The environment alone, with the training's robots and actions."""
-    collection: float
-    """The environment with estimator and actor-critic in its loop."""
-    learning: float
-    """The update: estimator and PPO."""
-    loop: float
-    """Collection and learning together."""
-    environment_over_engine: float
-    """The environment as a share of the engine alone."""
-    collection_over_engine: float
-    """Collection as a share of the engine alone."""
-    learning_over_engine: float
-    """Learning as a share of the engine alone."""
-    loop_over_engine: float
-    """The whole loop as a share of the engine alone."""
-    peak_memory_mb: float
-    """Largest memory of the process, MB."""
-
-
-def measure(task: str, num_envs: int, rollouts: int) -> Rates:
-    """Return the rates for one number of environments.
-
-    Args:
-        task: Name of the task.
-        num_envs: Number of environments.
-        rollouts: Turns to time.
-    """
-    cfg = make_task(task)
-    env = dataclasses.replace(cfg.env, num_envs=num_envs)
-    agent = dataclasses.replace(cfg.agent, init_std=_ACTION_STD)
-    cfg = dataclasses.replace(cfg, env=env, agent=agent)
-    torch.set_float32_matmul_precision(cfg.agent.matmul_precision)
-    runner = MuteRunner(task, cfg, None)
-    steps = cfg.agent.num_steps_per_env
-    collect, replay = _collection(runner, steps), _Replay(runner.env.env)
-    parts = {
-        "collection": collect,
-        "engine": replay.engine,
-        "environment": replay.environment,
-        "nominal_engine": _nominal_engine(runner.env.env, steps),
-        "learning": runner.alg.update,
-    }
-    runner.alg.train_mode()
-    times: dict[str, list[float]] = {name: [] for name in parts}
-    for rollout in range(rollouts + 1):
-        before = runner.env.env.state_dict()
-        for name, part in parts.items():
-            if name == "engine":
-                replay.load(before, runner.alg.storage.actions)
-            (use_learning_threads if name == "learning" else use_collection_threads)()
-            start = time.perf_counter()
-            part()
-            if rollout > 0:  # the first one warms up, and the estimator only waits in it
-                times[name].append(time.perf_counter() - start)
-    pairs = zip(times["collection"], times["learning"], strict=True)
-    times["loop"] = [collection + learning for collection, learning in pairs]
-    rates = {name: num_envs * steps / statistics.median(each) for name, each in times.items()}
-    over_engine = {
-        f"{name}_over_engine": _median_ratio(times["engine"], each)
-        for name, each in times.items()
-        if not name.endswith("engine")
-    }
-    measured = rates | over_engine | {"peak_memory_mb": peak_memory_mb()}
-    return Rates(num_envs=num_envs, rollouts=rollouts, **measured)
+_PEER_ROUNDS = 6
+"""Rounds of a peer unless --rollouts says how many: the fewest that have an interval."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status.
 
     Raises:
-        MuteError: If an argument is bad.
+        MuteError: If an argument is bad, or a process fails; what was measured before that has
+            then been written and printed.
+        KeyboardInterrupt: If interrupted, likewise.
     """
     argv = command_line() if argv is None else list(argv)
     args = parse(BenchmarkArgs, argv, "Measure the speed of training, part by part.")
-    task = task_name(args.task)
-    make_task(task)
+    peers = _check(args)
+    versions = [THIS, *([other_version(args.against)] if args.against else [])]
+    content: dict[str, Any] = {"task": task_name(args.task), "machine": machine_kind()}
+    content |= {"load_before": os.getloadavg()[0], "stopped": None}
+    try:
+        if args.until_walking:
+            time_to_walk(versions, args.task, args.seeds, content)
+        else:
+            content |= {"precision": args.precision, "parts": PARTS, "rates": [], "peers": []}
+            _measure(args, versions, content)
+            content["peers"] = _peer_rows(args, peers)
+    except (KeyboardInterrupt, MuteError) as stop:
+        content["stopped"] = str(stop) if isinstance(stop, MuteError) else "interrupted"
+        if content.get("rates") or content.get("walking"):
+            _tell(args, content)
+        raise
+    _tell(args, content)
+    return 0
+
+
+def _check(args: BenchmarkArgs) -> tuple[str, ...]:
+    """Check the arguments and return the peers.
+
+    Raises:
+        MuteError: If one is bad.
+    """
+    make_task(task_name(args.task))
     peers = peer_names(args.peers)
     check_distinct("num-envs", args.num_envs)
     for num_envs in args.num_envs:
         check_option("num-envs", num_envs, Range(1, 2**20, whole=True))
-    check_option("rollouts", args.rollouts, Range(1, 10**6, whole=True))
-    sizes = args.num_envs if args.json else track(args.num_envs, "environments")
-    rows = [_rates_apart(args.task, num_envs, args.rollouts) for num_envs in sizes]
-    peer_rows = _peer_rows(args, peers)
-    content = {"task": task, "machine": machine_kind(), "rates": rows, "peers": peer_rows}
-    if args.out is not None:
-        write_json(args.out, content)
-    if args.json:
-        print(json.dumps(content))
-    else:
-        print_table(f"control steps/s, {content['machine']}", rows, list(rows[0]))
-        if peer_rows:
-            shown = [{k: "-" if v is None else v for k, v in row.items()} for row in peer_rows]
-            print_table("peers, control steps/s", shown, list(PEER_COLUMNS))
-    return 0
+    check_option("precision", args.precision, Range(0.001, 1.0))
+    check_option("max-turns", args.max_turns, Range(MIN_TURNS, 10**6, whole=True))
+    if args.rollouts is not None:
+        check_option("rollouts", args.rollouts, Range(1, 10**6, whole=True))
+    check_seed(args.seed)
+    check_distinct("seeds", args.seeds)
+    for seed in args.seeds:
+        check_option("seeds", seed, Range(0, 2**31 - 1, whole=True))
+    if args.until_walking and peers:
+        raise MuteError("--peers goes with the parts, not with --until-walking: leave one away")
+    return peers
+
+
+def _measure(args: BenchmarkArgs, versions: Sequence[Version], content: dict[str, Any]) -> None:
+    """Add a row of rates for each number of environments, one that is cut short as well.
+
+    Raises:
+        MuteError: If a process fails.
+    """
+    for num_envs in args.num_envs:
+        times: dict[str, Times] = {}
+        ready: dict[str, dict[str, Any]] = {}
+        try:
+            with contextlib.ExitStack() as stack, _progress(args, num_envs) as show:
+                workers = [Worker(version, args.task, num_envs) for version in versions]
+                for worker in workers:
+                    stack.enter_context(worker)
+                    ready[worker.version.name] = worker.ready
+                content["versions"] = {name: _versions(each) for name, each in ready.items()}
+                for times in take_turns(workers, args.seed):
+                    show(times)
+                    if _enough(times, args):
+                        break
+        except MuteError as error:
+            raise MuteError(f"--num-envs {num_envs}: {error}") from error
+        finally:
+            if times:
+                content["rates"].append(_row(num_envs, times, ready, args.precision))
+
+
+def _enough(times: Mapping[str, Times], args: BenchmarkArgs) -> bool:
+    """Return whether there is no need for another turn, or no leave."""
+    turns = len(times["new"]["loop"])
+    if args.rollouts is not None:
+        return turns >= args.rollouts
+    return turns >= args.max_turns or is_precise(times, args.precision)
+
+
+def _versions(ready: Mapping[str, Any]) -> dict[str, Any]:
+    left_out = ("control_steps", "peak_memory_mb")
+    return {name: value for name, value in ready.items() if name not in left_out}
+
+
+def _row(
+    num_envs: int,
+    times: Mapping[str, Times],
+    ready: Mapping[str, Mapping[str, Any]],
+    precision: float,
+) -> dict[str, Any]:
+    """Return the figures of one number of environments, as plain data."""
+    row = {"num_envs": num_envs, "turns": len(times["new"]["loop"])}
+    row |= {"not_precise": shortfall(times, precision)}
+    row |= figures_of(times["new"], ready["new"])
+    if "old" in times:
+        memory = {name: each["peak_memory_mb"] for name, each in ready.items()}
+        row |= {"old": figures_of(times["old"], ready["old"])}
+        row |= {"new_over_old": comparison(times, memory)}
+    return row
+
+
+@contextlib.contextmanager
+def _progress(
+    args: BenchmarkArgs, num_envs: int
+) -> Iterator[Callable[[Mapping[str, Times]], None]]:
+    """Show the turns of one number of environments; yield what is to be called after each."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("turn {task.completed}"))
+    ends = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, *ends, console=console, disable=args.json) as progress:
+        name = f"{num_envs} environments"
+        shown = progress.add_task(name, total=args.rollouts)
+
+        def show(times: Mapping[str, Times]) -> None:
+            turns, width = len(times["new"]["loop"]), widest(times)[1]
+            known = f", ±{width:.1%}" if math.isfinite(width) else ""
+            total = args.rollouts or _turns_in_all(turns, width, args)
+            progress.update(shown, completed=turns, total=total, description=f"{name}{known}")
+
+        yield show
+
+
+def _turns_in_all(turns: int, width: float, args: BenchmarkArgs) -> int | None:
+    """Return about how many turns it takes: intervals shrink as the root of their number grows."""
+    if not math.isfinite(width):
+        return None
+    needed = math.ceil(turns * (width / args.precision) ** 2)
+    return min(args.max_turns, max(turns, MIN_TURNS, needed))
 
 
 def _peer_rows(args: BenchmarkArgs, peers: Sequence[str]) -> list[dict[str, Any]]:
@@ -202,111 +266,51 @@ def _peer_rows(args: BenchmarkArgs, peers: Sequence[str]) -> list[dict[str, Any]
         "unilab": args.unilab_python,
     }
     pythons = peer_pythons(peers, args.peers_from, given)
-    rounds, robots = args.rollouts, min(args.num_envs)
+    rounds, robots = args.rollouts or _PEER_ROUNDS, min(args.num_envs)
     return [
         dataclasses.asdict(rate) for rate in time_peers(peers, pythons, robots, rounds, args.task)
     ]
 
 
-def _rates_apart(task: str, num_envs: int, rollouts: int) -> dict[str, float]:
-    try:
-        return dataclasses.asdict(call_apart(_measure_as_trained, task, num_envs, rollouts))
-    except MuteError as error:
-        raise MuteError(f"--num-envs {num_envs}: {error}") from error
+def _tell(args: BenchmarkArgs, content: Mapping[str, Any]) -> None:
+    """Write and print what was measured."""
+    if args.out is not None:
+        write_json(args.out, content)
+    if args.json:
+        print(json.dumps(content))
+        return
+    if args.until_walking:
+        shown = [{k: "-" if v is None else v for k, v in row.items()} for row in content["walking"]]
+        print_table(f"{content['definition']}; {content['machine']}", shown, list(shown[0]))
+        if content["median_old_over_new"] is not None:
+            print(f"old / new, median over seeds: {content['median_old_over_new']:.2f}")
+        return
+    print("\n".join(f"{CAPTIONS[name]}: {sentence}" for name, sentence in content["parts"].items()))
+    for row in content["rates"]:
+        title = f"{row['num_envs']} environments, medians of {row['turns']} turns, 95 % intervals"
+        table = list(_table(row))
+        print_table(f"{title}; {content['machine']}", table, list(table[0]))
+        if row["not_precise"]:
+            print(f"{row['num_envs']} environments: {row['not_precise']}", file=sys.stderr)
+    if content["peers"]:
+        shown = [{k: "-" if v is None else v for k, v in row.items()} for row in content["peers"]]
+        print_table("peers, control steps/s", shown, list(PEER_COLUMNS))
 
 
-def _measure_as_trained(task: str, num_envs: int, rollouts: int) -> Rates:
-    """Return the rates in a process whose memory is kept as in that of a training."""
-    keep_freed_memory()
-    load_plugins()
-    return measure(task_name(task), num_envs, rollouts)
-
-
-def _median_ratio(engine: Sequence[float], part: Sequence[float]) -> float:
-    """Return how fast a part is as a share of the engine, by turns."""
-    return statistics.median(one / other for one, other in zip(engine, part, strict=True))
-
-
-class _Physics:
-    """MuJoCo alone: control steps of robots whose set points are given."""
-
-    def __init__(self, env: QuadrupedEnv) -> None:
-        """Make nominal robots of the model of an environment."""
-        self._env = env
-        self.batch = Batch(env.model, env.num_envs)
-        self._ctrl = self.batch.bind("ctrl")
-
-    def follow(self, actions: torch.Tensor) -> None:
-        """Take actions' set points, as the environment does. Shape: (num_steps, num_envs, 12)."""
-        cfg = self._env.cfg
-        clipped = torch.nan_to_num(actions).clamp(-cfg.action_clip, cfg.action_clip)
-        self._targets = (self._env.stand + cfg.action_scale * clipped).double().numpy()
-
-    def run(self) -> None:
-        """Step the physics."""
-        for target in self._targets:
-            self._ctrl[:] = target
-            self.batch.step(nstep=self._env.cfg.decimation)
-
-
-class _Replay:
-    """A rollout that a training's robots have done, done again by engine or environment alone.
-
-    For the engine what falls stays down, and pushes are left out: in the first rollouts of a
-    training, which are timed, hardly a robot falls or is pushed.
-    """
-
-    def __init__(self, env: QuadrupedEnv) -> None:
-        """Make the same robots twice; `env` is the training's."""
-        self._env = QuadrupedEnv(env.cfg)
-        self._physics = _Physics(env)
-        self.engine = self._physics.run
-        batch = self._physics.batch
-        self._state = batch.state
-        for key, value in env.simulation.state_dict().items():
-            if key.startswith("field/"):
-                batch.expand(key.removeprefix("field/"))[:] = value.numpy()
-        batch.set_const()
-
-    def load(self, before: dict[str, Any], actions: torch.Tensor) -> None:
-        """Go to where a rollout began.
-
-        Args:
-            before: The environment's state there.
-            actions: Actions of the rollout. Shape: (num_steps, num_envs, 12).
-        """
-        self._env.load_state_dict(before)
-        self._state[:] = before["simulation"]["integration"].numpy()
-        self._actions = actions.clone()
-        self._physics.follow(actions)
-
-    @torch.inference_mode()
-    def environment(self) -> None:
-        """Step the environment."""
-        for action in self._actions:
-            self._env.step(action)
-
-
-def _nominal_engine(env: QuadrupedEnv, steps: int) -> Callable[[], None]:
-    physics = _Physics(env)
-    physics.batch.reset(keyframe=env.model.key("stand").id)
-    physics.follow(_ACTION_STD * torch.randn(steps, env.num_envs, NUM_ACTIONS))
-    return physics.run
-
-
-def _collection(runner: MuteRunner, steps: int) -> Callable[[], None]:
-    algorithm: PPO = runner.alg
-    env = runner.env
-
-    @torch.inference_mode()
-    def run() -> None:
-        observations = env.get_observations()
-        for _ in range(steps):
-            actions = algorithm.act(observations)
-            observations, rewards, dones, extras = env.step(actions)
-            check_nan(observations, rewards, dones)
-            algorithm.process_env_step(observations, rewards, dones, extras)
-            runner.logger.process_env_step(rewards, dones, extras)
-        algorithm.compute_returns(observations)
-
-    return run
+def _table(row: Mapping[str, Any]) -> Iterator[dict[str, str]]:
+    """Yield the lines of the table of one number of environments."""
+    for name, caption in CAPTIONS.items():
+        form = "{:,.0f}" if name in PARTS else "{:.1%}"
+        line = {"control steps/s, or ratio": caption, "new": with_interval(row, name, form)}
+        if "old" in row:
+            line["old"] = with_interval(row["old"], name, form)
+            compared = name in PARTS
+            line["new / old"] = (
+                with_interval(row["new_over_old"], name, "{:.3f}") if compared else "-"
+            )
+        yield line
+    line = {"control steps/s, or ratio": "peak memory (MB)", "new": f"{row['peak_memory_mb']:,.0f}"}
+    if "old" in row:
+        line["old"] = f"{row['old']['peak_memory_mb']:,.0f}"
+        line["new / old"] = f"{row['new_over_old']['peak_memory_mb']:.3f}"
+    yield line

@@ -38,7 +38,7 @@ class CardArgs:
     """Directory of what `evaluate.py reliability` wrote of several seeds, as seed0.json, seed1.json
     and so on, with what `evaluate.py progress` wrote of each as seed0_progress.json."""
     benchmark: Path = _DOCS / "benchmark.json"
-    """File that `mute.benchmark --out` wrote; those of other machines lie beside it."""
+    """File that `mute.benchmark --out` wrote; that of peers on another machine lies beside it."""
     out: Path | None = None
     """Directory of the pages results.md and benchmark.md; printed if not given."""
 
@@ -97,8 +97,7 @@ def read_benchmarks(args: CardArgs) -> BenchmarkFiles:
     """
     docs = args.benchmark.parent
     return BenchmarkFiles(
-        first=_read(args.benchmark),
-        matched=_read(docs / "benchmark_no_bfloat16.json"),
+        training=_read(args.benchmark),
         peers=_read(docs / "peers.json"),
         sound=_read(args.noise.parent / "benchmark.json"),
     )

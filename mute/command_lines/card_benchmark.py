@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from mute.command_lines.benchmark_figures import CAPTIONS, PARTS, with_interval
 from mute.command_lines.card_tables import markdown
 
 __all__ = ["BenchmarkFiles", "benchmark_page"]
 
-_RATES = {
-    "num_envs": ("environments", "{:d}"),
-    "engine": ("engine alone", "{:,.0f}"),
-    "nominal_engine": ("engine, nominal robots", "{:,.0f}"),
-    "environment": ("environment", "{:,.0f}"),
-    "collection": ("collection", "{:,.0f}"),
-    "learning": ("learning", "{:,.0f}"),
-    "loop": ("whole loop", "{:,.0f}"),
-    "environment_over_engine": ("environment / engine", "{:.0%}"),
-    "loop_over_engine": ("loop / engine", "{:.0%}"),
-    "peak_memory_mb": ("memory (MB)", "{:,.0f}"),
+_MEASURED = {
+    "num_envs": ("environments", "{}"),
+    "version": ("version", "{}"),
+    "turns": ("turns", "{}"),
+    **{name: (caption, "{}") for name, caption in CAPTIONS.items()},
+    "peak_memory_mb": ("memory (MB)", "{}"),
 }
 _PEERS = {
     "name": ("peer", "{}"),
@@ -54,19 +50,17 @@ _PARTS_OF_SOUND = {
 class BenchmarkFiles:
     """What the files hold, as plain data."""
 
-    first: Mapping[str, Any]
-    """Rates on the faster machine, with those of nominal robots as the engine's, and peers."""
-    matched: Mapping[str, Any]
-    """Rates on the slower one, compared with physics of the training's own robots."""
+    training: Mapping[str, Any]
+    """Rates of training, and peers on the same machine."""
     peers: Mapping[str, Any]
-    """Peers on a third machine."""
+    """Peers on another machine."""
     sound: Mapping[str, Any]
     """What it takes to hear robots."""
 
 
 def benchmark_page(files: BenchmarkFiles) -> str:
     """Return the whole page."""
-    return "\n\n".join((_head(), _training(files), _peers(files), _sound(files))) + "\n"
+    return "\n\n".join((_head(), _training(files.training), _peers(files), _sound(files))) + "\n"
 
 
 def _head() -> str:
@@ -74,45 +68,97 @@ def _head() -> str:
         "<!-- Made by `python -m mute.card --out docs`; do not edit. -->\n\n"
         "# Speed\n\n"
         "Control steps a second: environments times steps, each of 20 ms. All of it was timed on "
-        "CPUs with 2 cores; the GPU has not been measured. Single runs on a shared machine differ "
-        "by some percent, so use the ratios within one table. This page is made by `python -m "
-        "mute.card --out docs`; the figures are those of the commits that wrote the files, some "
-        "of which are older than today's networks."
+        "CPUs. This page is made by `python -m mute.card --out docs`; the figures are those of the "
+        "commits that wrote the files."
     )
 
 
-def _training(files: BenchmarkFiles) -> str:
-    first, matched = files.first, files.matched
-    nominal = {row["num_envs"]: row["loop"] / row["nominal_engine"] for row in matched["rates"]}
-    shares = ", ".join(f"{share:.0%} at {number}" for number, share in nominal.items())
-    turns = " and ".join(str(row["rollouts"]) for row in matched["rates"])
+def _training(measured: Mapping[str, Any]) -> str:
+    rows = [line for row in measured["rates"] for line in _lines(row)]
+    sizes = " ".join(str(row["num_envs"]) for row in measured["rates"])
+    compared = "old" in measured["versions"]
+    against = " --against PYTHON:CHECKOUT" if compared else ""
+    parts = "\n".join(
+        f"- {CAPTIONS[name]}: {sentence};" for name, sentence in measured["parts"].items()
+    )
     return (
         "## Training\n\n"
-        "`python -m mute.benchmark --num-envs 1024 4096 --out FILE` times every part in turns with "
-        "the bare engine and takes medians over turns. The engine steps the training's own robots "
-        "from the same states with the same actions, so what is missing to 100 % is what training "
-        f"adds to physics. On {matched['machine']}, without bfloat16 units, "
-        f"{turns} turns (`docs/benchmark_no_bfloat16.json`):\n\n"
-        f"{_rates(matched['rates'])}\n\n"
-        f"Nominal robots that stand are stepped faster; of their rate the loop's is {shares}.\n\n"
-        f"An older run on {first['machine']}, of a faster kind, in which the engine is that of "
-        "nominal robots (`docs/benchmark.json`):\n\n"
-        f"{_rates(first['rates'])}"
+        f"`python -m mute.benchmark --num-envs {sizes}{against} --out docs/benchmark.json` on "
+        f"{measured['machine']}, with a load average of {measured['load_before']:.1f} from other "
+        f"work as it began. {_versions(measured['versions'])}\n\n"
+        f"{markdown(rows, _MEASURED)}\n\n"
+        f"{_precision(measured)}What is measured:\n\n"
+        f"{parts}\n"
+        "- memory: the most that a process has held after three iterations of training, without "
+        "what the other parts need.\n\n"
+        "Each figure is the median over turns, and in brackets stands its 95 % interval, from one "
+        "order statistic to another (binomial, distribution-free). A turn does every part once, of "
+        "both versions where there are two, which wait for each other in processes of their own; "
+        "the order is drawn anew for every second turn and then gone backwards. A ratio is taken "
+        "within a turn, so it is not quite the quotient of two medians. A training goes on from "
+        "turn to turn; its first actions have a standard deviation of 0.4."
     )
+
+
+def _lines(row: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield the lines of one number of environments: new, old, and new over old."""
+    common = {"num_envs": row["num_envs"], "turns": row["turns"]}
+    yield common | {"version": "new"} | _cells(row, "{:,.0f}")
+    if "old" in row:
+        yield common | {"version": "old"} | _cells(row["old"], "{:,.0f}")
+        yield common | {"version": "new / old"} | _cells(row["new_over_old"], "{:.2f}")
+
+
+def _cells(figures: Mapping[str, Any], form: str) -> dict[str, str | None]:
+    """Return figures with their intervals; None where a line has none."""
+    cells: dict[str, str | None] = {"peak_memory_mb": form.format(figures["peak_memory_mb"])}
+    for name in CAPTIONS:
+        own = form if name in PARTS else "{:.0%}"
+        cells[name] = with_interval(figures, name, own) if name in figures else None
+    return cells
+
+
+def _versions(versions: Mapping[str, Mapping[str, str]]) -> str:
+    told = [
+        f"{name.capitalize()} is commit {each['commit'][:10]}{_changed(each['commit'])} with "
+        f"{each['engine']}, torch {each['torch']}, Python {each['python']}."
+        for name, each in versions.items()
+    ]
+    return " ".join(told)
+
+
+def _changed(commit: str) -> str:
+    return " (changed)" if commit.endswith("-dirty") else ""
+
+
+def _precision(measured: Mapping[str, Any]) -> str:
+    """Return which intervals are wider than they should be, and whether it was cut short."""
+    told = [
+        f"At {row['num_envs']}, {row['not_precise']}."
+        for row in measured["rates"]
+        if row["not_precise"]
+    ]
+    told += [f"The run was cut short: {measured['stopped']}."] if measured["stopped"] else []
+    return " ".join(told) + "\n\n" if told else ""
 
 
 def _peers(files: BenchmarkFiles) -> str:
-    return (
-        "## Other simulations on the CPU\n\n"
-        "`python -m benchmarks.make_peers --into DIR` makes their environments, and `python -m "
-        "mute.benchmark --peers all --peers-from DIR` times them in turns with MUTE itself: the "
-        "environment alone, and their own training loops, all of an iteration, without what is "
-        "compiled before. Medians over rounds, in brackets the 95 % interval where there are six "
-        "or more. mjlab, MuJoCo Playground and UniLab have robots and tasks of their own. On "
-        f"{files.first['machine']}, beside the older run above (`docs/benchmark.json`):\n\n"
-        f"{_peer_table(files.first['peers'])}\n\n"
-        f"On {files.peers['machine']} (`docs/peers.json`):\n\n"
-        f"{_peer_table(files.peers['peers'])}"
+    tables = [
+        f"On {where['machine']} (`docs/{name}`):\n\n{_peer_table(where['peers'])}"
+        for name, where in (("benchmark.json", files.training), ("peers.json", files.peers))
+        if where["peers"]
+    ]
+    return "\n\n".join(
+        (
+            "## Other simulations on the CPU",
+            "`python -m benchmarks.make_peers --into DIR` makes their environments, and `python -m "
+            "mute.benchmark --peers all --peers-from DIR` times them in turns with MUTE itself: "
+            "the environment alone, and their own training loops, all of an iteration, without "
+            "what is compiled before. Medians over rounds, in brackets the 95 % interval where "
+            "there are six or more. mjlab, MuJoCo Playground and UniLab have robots and tasks of "
+            "their own.",
+            *tables,
+        )
     )
 
 
@@ -152,9 +198,3 @@ def _sound(files: BenchmarkFiles) -> str:
         f"The process takes {sound['memory_mb']:.0f} MB, and {sound['memory_growth_mb']:.0f} MB "
         "more for walks of twice the length."
     )
-
-
-def _rates(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the table of rates, without columns that a file has no figures for."""
-    columns = {name: column for name, column in _RATES.items() if name in rows[0]}
-    return markdown(rows, columns)

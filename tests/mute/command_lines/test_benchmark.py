@@ -2,40 +2,55 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 import torch
 from bare_go1 import BareGo1
 from mujoco.batch import Batch
+from places import REPOSITORY
 
 from mute import tasks
 from mute.command_lines import benchmark
-from mute.envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
+from mute.command_lines.arguments import parse
+from mute.command_lines.benchmark_figures import figures_of, ratios, shortfall
+from mute.envs.quadruped_env import NUM_ACTIONS
 from mute.envs.scene import STAND_JOINT_POS, build_scene
 from mute.support import provenance
 from mute.support.errors import MuteError
 from mute.tasks import DEFAULT_TASK, make_task
 
+_PARTS = ("engine", "nominal_engine", "environment", "collection", "learning", "loop")
 
-def test_the_benchmark_prints_the_rates_of_every_part_as_json(capsys):
+
+def test_two_versions_take_turns_and_every_part_of_both_is_printed_as_json(capsys):
+    against = ["--against", f"{sys.executable}:{REPOSITORY}"]
     peers = ["--peers", "gymnasium,mjlab", "--mjlab-python", "/nowhere/python"]
-    assert benchmark.main(["--num-envs", "4", "--rollouts", "1", "--json", *peers]) == 0
+    argv = ["--num-envs", "4", "--rollouts", "1", "--json", *against, *peers]
+    assert benchmark.main(argv) == 0
     content = json.loads(capsys.readouterr().out)
-    (rates,) = content["rates"]
-    assert (rates["num_envs"], rates["rollouts"]) == (4, 1)
-    names = ("engine", "nominal_engine", "environment", "collection", "learning", "loop")
-    parts = [rates[name] for name in names]
-    assert all(rate > 0.0 for rate in parts)
-    # The loop is collection and learning, one after the other.
-    assert 1.0 / rates["loop"] == pytest.approx(1.0 / rates["collection"] + 1.0 / rates["learning"])
-    for name in ("environment", "collection", "learning", "loop"):
-        assert rates[f"{name}_over_engine"] == pytest.approx(rates[name] / rates["engine"])
-    assert rates["peak_memory_mb"] > 100.0
+    assert content["stopped"] is None
+    assert set(content["parts"]) == set(_PARTS)
+    assert content["versions"]["old"] == content["versions"]["new"]
+    assert content["versions"]["old"]["torch"] == torch.__version__
+    (row,) = content["rates"]
+    assert (row["num_envs"], row["turns"]) == (4, 1)
+    for version in (row, row["old"]):
+        assert all(version[name] > 0.0 for name in _PARTS)
+        # The loop is collection and learning, one after the other.
+        apart = 1.0 / version["collection"] + 1.0 / version["learning"]
+        assert 1.0 / version["loop"] == pytest.approx(apart)
+        of_nominal = version["loop"] / version["nominal_engine"]
+        assert version["loop_over_nominal_engine"] == pytest.approx(of_nominal)
+        assert version["intervals"]["loop"] == [None, None]  # a turn alone has none
+        assert version["peak_memory_mb"] > 100.0
+    for name in (*_PARTS, "peak_memory_mb"):
+        assert row["new_over_old"][name] == pytest.approx(row[name] / row["old"][name])
+    assert "1 turns are too few for 3.0%" in row["not_precise"]
     itself, gymnasium, mjlab = content["peers"]
     assert [peer["name"] for peer in content["peers"]] == ["mute", "gymnasium", "mjlab"]
     assert (itself["num_envs"], itself["task"]) == (4, "go1_mute")
@@ -71,33 +86,139 @@ def test_a_task_of_a_users_own_module_is_measured_in_every_process(capsys):
     assert content["peers"][1]["environment"] > 0.0
 
 
-def test_engine_and_environment_do_again_what_the_training_did():
-    task = make_task(DEFAULT_TASK)
-    cfg = dataclasses.replace(task.env, num_envs=3)
-    env = QuadrupedEnv(cfg)
-    replay = benchmark._Replay(env)
-    generator = torch.Generator().manual_seed(0)
-    actions = 0.5 * torch.randn(20, 3, NUM_ACTIONS, generator=generator)
-    actions[3, 0, :2] = torch.tensor([math.nan, 50.0])  # what the environment clips
-    for _ in range(2):  # the second one starts where the first one ended
-        before = env.state_dict()
-        for action in actions:
-            # Resets are the environment's alone.
-            assert not env.step(action)[2].any()
-        replay.load(before, actions)
-        replay.engine()
-        replay.environment()
-        assert torch.equal(replay._env.simulation.qpos, env.simulation.qpos)
-        qpos = torch.from_numpy(replay._physics.batch.bind("qpos")).float()
-        torch.testing.assert_close(qpos, env.simulation.qpos, atol=1e-4, rtol=1e-4)
-    friction = env.simulation.field("geom_friction").numpy()
-    assert (replay._physics.batch.expand("geom_friction") == friction).all()
-    assert friction.std() > 0.0
+def _constructed(loop: Sequence[float], engine: float = 0.5) -> dict[str, list[float]]:
+    """Return times of turns, s, in which the loop's alone differ."""
+    same = {name: [engine] * len(loop) for name in _PARTS}
+    return same | {"loop": list(loop)}
 
 
-def test_a_part_is_compared_with_the_engine_turn_by_turn():
+def _args(*words: str) -> benchmark.BenchmarkArgs:
+    return parse(benchmark.BenchmarkArgs, words, "")
+
+
+def _turns_until_enough(loops: Sequence[float], *words: str) -> int:
+    enough = (
+        number
+        for number in range(1, len(loops) + 1)
+        if benchmark._enough({"new": _constructed(loops[:number])}, _args(*words))
+    )
+    return next(enough)
+
+
+def test_turns_that_all_say_the_same_are_enough_once_there_are_ten():
+    assert _turns_until_enough([1.0] * 100) == 10
+
+
+def test_turns_go_on_until_half_the_interval_of_every_ratio_is_within_the_precision():
+    # Of turns of 0.94, 1.00 and 1.06 s, a third each, it takes many until neither bound is of the
+    # outer ones.
+    loops = [0.94, 1.0, 1.06] * 30
+    turns = _turns_until_enough(loops, "--max-turns", "90")
+    ratios = sorted(0.5 / loop for loop in loops[:turns])
+    before = sorted(0.5 / loop for loop in loops[: turns - 1])
+    assert turns > 20
+    assert _half_width(ratios) <= 0.03 < _half_width(before)
+    assert _turns_until_enough(loops, "--precision", "0.07") == 10
+
+
+def _half_width(ratios: Sequence[float]) -> float:
+    """Return half the interval over the median, by counting the binomial's outcomes."""
+    number = len(ratios)
+    outside, rank = 0, 0
+    while 2 * (outside + math.comb(number, rank)) <= 0.05 * 2**number:
+        outside += math.comb(number, rank)
+        rank += 1
+    middle = 0.5 * (ratios[(number - 1) // 2] + ratios[number // 2])
+    return 0.5 * (ratios[number - rank] - ratios[rank - 1]) / middle
+
+
+def test_turns_that_never_agree_end_at_the_most_and_that_is_told_in_one_line():
+    loops = [0.5, 2.0] * 20
+    assert _turns_until_enough(loops, "--max-turns", "40") == 40
+    told = shortfall({"new": _constructed(loops)}, 0.03)
+    assert told == ("40 turns are too few for 3.0%: the 95% interval of loop / engine is ±60.0%")
+
+
+def test_as_many_turns_are_taken_as_asked_for_however_precise():
+    assert _turns_until_enough([1.0] * 100, "--rollouts", "25") == 25
+    assert _turns_until_enough([0.5, 2.0] * 20, "--rollouts", "3") == 3
+
+
+def test_ratios_are_taken_turn_by_turn():
     # Turns say 1/2, 1/6 and 1/2; the medians of the times, 1 and 6, would say 1/6.
-    assert benchmark._median_ratio([1.0, 1.0, 3.0], [2.0, 6.0, 6.0]) == 0.5
+    times = {name: [1.0, 1.0, 3.0] for name in _PARTS} | {"loop": [2.0, 6.0, 6.0]}
+    assert ratios({"new": times})["loop_over_engine"].median == 0.5
+    both = ratios({"new": times, "old": {name: [6.0, 6.0, 9.0] for name in _PARTS}})
+    assert both["loop_new_over_old"].median == 1.5
+    assert both["engine_new_over_old"].median == 6.0
+
+
+def test_rates_are_control_steps_over_the_median_time():
+    ready = {"control_steps": 48, "peak_memory_mb": 700.0}
+    figures = figures_of(_constructed([2.0] * 5 + [3.0] * 4), ready)
+    assert (figures["loop"], figures["engine"]) == (24.0, 96.0)
+    assert figures["intervals"]["loop"] == [16.0, 24.0]
+    assert figures["peak_memory_mb"] == 700.0
+
+
+class _Constructed:
+    """Stands in for a worker that is never asked."""
+
+    def __init__(self, version, *_: object) -> None:
+        self.version = version
+        self.ready = {"control_steps": 48, "peak_memory_mb": 700.0, "engine": "constructed"}
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("stop", "told"),
+    [(KeyboardInterrupt(), "interrupted"), (MuteError("gone"), "--num-envs 8: gone")],
+)
+def test_what_was_measured_before_a_stop_is_written_and_printed(
+    stop, told, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(benchmark, "Worker", _Constructed)
+    sizes = iter([False, True])
+
+    def turns(*_: object):
+        stops = next(sizes)
+        for number in (1, 2, 3):
+            yield {"new": _constructed([2.0] * number)}
+        if stops:
+            raise stop
+
+    monkeypatch.setattr(benchmark, "take_turns", turns)
+    argv = ["--num-envs", "4", "8", "--out", str(tmp_path / "rates.json")]
+    # The first size has its three turns, the second one is cut short after as many.
+    rollouts = iter([False, False, True, False, False, False])
+    monkeypatch.setattr(benchmark, "_enough", lambda *_: next(rollouts))
+    with pytest.raises(type(stop)):
+        benchmark.main(argv)
+    content = json.loads((tmp_path / "rates.json").read_text())
+    assert content["stopped"] == told
+    assert [(row["num_envs"], row["turns"]) for row in content["rates"]] == [(4, 3), (8, 3)]
+    assert [row["loop"] for row in content["rates"]] == [24.0, 24.0]
+    assert "8 environments, medians of 3 turns" in capsys.readouterr().out
+
+
+def test_nothing_is_written_over_a_file_when_nothing_was_measured(tmp_path, monkeypatch):
+    monkeypatch.setattr(benchmark, "Worker", _Constructed)
+
+    def turns(*_: object):
+        raise KeyboardInterrupt
+        yield
+
+    monkeypatch.setattr(benchmark, "take_turns", turns)
+    out = tmp_path / "rates.json"
+    out.write_text("earlier")
+    with pytest.raises(KeyboardInterrupt):
+        benchmark.main(["--num-envs", "4", "--out", str(out)])
+    assert out.read_text() == "earlier"
 
 
 @pytest.mark.parametrize(
@@ -108,6 +229,13 @@ def test_a_part_is_compared_with_the_engine_turn_by_turn():
         (["--task", "fly"], "--task"),
         (["--peers", "isaac"], "--peers"),
         (["--peers", "mjlab,mjlab"], "--peers"),
+        (["--precision", "0"], "--precision must be"),
+        (["--max-turns", "9"], "--max-turns must be"),
+        (["--seeds", "1", "1"], "--seeds must name each but once"),
+        (["--against", "/nowhere/python"], "'/nowhere/python' is no interpreter"),
+        (["--against", f"{sys.executable}:/nowhere"], "checkout of MUTE after ':', got '/nowhere'"),
+        (["--against", f"{sys.executable}:"], "checkout of MUTE after ':', got ''"),
+        (["--until-walking", "--peers", "all"], "--until-walking"),
     ],
 )
 def test_the_benchmark_refuses_bad_input_by_name(arguments, names):

@@ -1,0 +1,105 @@
+"""Tests of the page of speed: what it says of a file that the benchmark wrote."""
+
+from __future__ import annotations
+
+import pytest
+
+from mute.command_lines.benchmark_figures import PARTS, comparison, figures_of
+from mute.command_lines.card_benchmark import BenchmarkFiles, benchmark_page
+
+_SOUND = {
+    "trials": 1,
+    "seconds": 1.0,
+    "floor": "wood",
+    "machine": "a machine for sound",
+    "parts": [{"name": "whole", "robots": 1, "wall": 1.0, "real_time": 1.0}],
+    "memory_mb": 1.0,
+    "memory_growth_mb": 0.0,
+}
+_PEER = {"version": "1.0", "num_envs": 8, "environment": 6000.0, "note": "steps something"}
+
+
+def _version(commit: str, engine: str) -> dict[str, str]:
+    return {"commit": commit, "engine": engine, "torch": "2.0", "python": "3.11"}
+
+
+def _measured() -> dict:
+    """Return what the benchmark writes of ten turns in which the old version took twice as long."""
+    new = {part: [1.0] * 5 + [2.0] * 5 for part in PARTS}
+    old = {part: [2.0] * 5 + [4.0] * 5 for part in PARTS}
+    memory = {"new": 500.0, "old": 1000.0}
+    ready = {name: {"control_steps": 24000, "peak_memory_mb": memory[name]} for name in memory}
+    row = {"num_envs": 1024, "turns": 10, "not_precise": None, **figures_of(new, ready["new"])}
+    row["old"] = figures_of(old, ready["old"])
+    row["new_over_old"] = comparison({"new": new, "old": old}, memory)
+    return {
+        "machine": "a machine",
+        "load_before": 0.25,
+        "stopped": None,
+        "parts": PARTS,
+        "versions": {"new": _version("a" * 40, "one 2"), "old": _version("b" * 40, "two 1")},
+        "rates": [row],
+        "peers": [],
+    }
+
+
+def _page(measured: dict) -> str:
+    peers = {"machine": "a machine of peers", "peers": [_PEER | {"name": "mjlab"}]}
+    return benchmark_page(BenchmarkFiles(training=measured, peers=peers, sound=_SOUND))
+
+
+def _lines(page: str) -> list[list[str]]:
+    rows = (line for line in page.splitlines() if line.startswith("| 1024 |"))
+    return [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
+
+
+def test_there_is_a_line_for_each_version_and_one_that_compares_them():
+    new, old, compared = _lines(_page(_measured()))
+    assert new[:4] == ["1024", "new", "10", "18,000 [12,000, 24,000]"]
+    assert old[:4] == ["1024", "old", "10", "9,000 [6,000, 12,000]"]
+    assert compared[:4] == ["1024", "new / old", "10", "2.00 [2.00, 2.00]"]
+    assert new[-4:] == ["100% [100%, 100%]"] * 3 + ["500"]
+    assert compared[-4:] == ["-", "-", "-", "0.50"]
+
+
+def test_a_version_alone_is_not_compared():
+    measured = _measured()
+    del measured["versions"]["old"], measured["rates"][0]["old"]
+    page = _page(measured)
+    assert [line[1] for line in _lines(page)] == ["new"]
+    assert "--against" not in page
+
+
+def test_the_page_says_what_each_part_is_of_which_versions_and_on_what_machine():
+    page = _page(_measured())
+    for sentence in PARTS.values():
+        assert sentence in page
+    assert "New is commit aaaaaaaaaa with one 2" in page
+    assert "Old is commit bbbbbbbbbb with two 1" in page
+    assert "on a machine, with a load average of 0.2 from other work" in page
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda measured: measured["rates"][0].update(not_precise="10 turns are too few"),
+         "At 1024, 10 turns are too few."),
+        (lambda measured: measured.update(stopped="interrupted"),
+         "The run was cut short: interrupted."),
+    ],
+)  # fmt: skip
+def test_what_is_not_precise_or_not_whole_is_told(change, told):
+    measured = _measured()
+    assert told not in _page(measured)
+    change(measured)
+    assert told in _page(measured)
+
+
+def test_peers_stand_with_the_machine_that_each_was_timed_on():
+    measured = _measured()
+    assert "On a machine (`docs/benchmark.json`)" not in _page(measured)
+    measured["peers"] = [_PEER | {"name": "gymnasium"}]
+    page = _page(measured)
+    assert "On a machine (`docs/benchmark.json`):\n\n| peer" in page
+    assert "On a machine of peers (`docs/peers.json`):\n\n| peer" in page
+    assert "| gymnasium | 1.0 | - | - | - | - | 8 | 6,000 | - | steps something |" in page
