@@ -21,6 +21,9 @@ _WRITTEN = ("qpos", "qvel", "ctrl")
 _READ = ("sensordata", "actuator_force")
 """Arrays that follow from the state."""
 
+_VERSION = tuple(int(part) for part in mujoco.__version__.split(".")[:3])
+"""Version of MuJoCo, saved with a state."""
+
 _STAGES: dict[Stage, int] = {
     "positions": int(mujoco.mjtStage.mjSTAGE_POS),
     "all": int(mujoco.mjtStage.mjSTAGE_ACC),
@@ -111,6 +114,7 @@ class BatchSimulation:
     def state_dict(self) -> dict[str, torch.Tensor]:
         """Return all that is needed to continue bit for bit."""
         state = saved_fields(self._fields)
+        state["mujoco"] = torch.tensor(_VERSION)
         state["integration"] = torch.from_numpy(self._state.copy())
         # A push written since the last step reaches the engine's own state in the next one only.
         state["qpos"], state["qvel"] = self.qpos.clone(), self.qvel.clone()
@@ -128,8 +132,17 @@ class BatchSimulation:
                 "simulation state is not of the engine 'mujoco': go on with the engine and the"
                 " device that it was saved with"
             )
+        if "mujoco" not in state:
+            raise ValueError(
+                "simulation state is of the engine of an earlier version, whose trainings cannot go"
+                " on here; their policies play and export as before"
+            )
         integration = state["integration"].numpy()
-        self._check_shape(integration.shape)
+        if integration.shape != self._state.shape:
+            raise ValueError(
+                f"simulation state has shape {integration.shape}, this model and num_envs need "
+                f"{self._state.shape}"
+            )
         load_fields(self, state)
         self.set_const()
         self._warnings.zero_()  # of a past that is not this state's
@@ -141,21 +154,6 @@ class BatchSimulation:
         self._state[:] = integration
         self.qpos.copy_(state["qpos"])
         self.qvel.copy_(state["qvel"])
-
-    def _check_shape(self, shape: tuple[int, ...]) -> None:
-        """Refuse a saved state of so many simulations and numbers."""
-        if shape[0] != self.num_envs:
-            raise ValueError(
-                f"simulation state has shape {shape}, this model and num_envs need "
-                f"{self._state.shape}"
-            )
-        if shape != self._state.shape:
-            raise ValueError(
-                f"simulation state has {shape[1]} numbers a robot, MuJoCo {mujoco.__version__} has"
-                f" {self._state.shape[1]} for this model: it is of another model or of the engine"
-                " of an earlier version, whose trainings cannot go on here; their policies play"
-                " and export as before"
-            )
 
     @contextmanager
     def _calling(self) -> Iterator[None]:

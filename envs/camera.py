@@ -23,17 +23,17 @@ class Camera:
     def frame(self, env: QuadrupedEnv, index: int) -> np.ndarray:
         """Return a picture of one robot, uint8. Shape: (height, width, 3)."""
         # Every seed has a model of its own, but all look the same.
-        if self._model is None or self._renderer is None:
-            self._model = build_scene(env.cfg.scene)
-            self._renderer = mujoco.Renderer(self._model, *self._size)
-        data = mujoco.MjData(self._model)
+        model = self._model or build_scene(env.cfg.scene)
+        renderer = self._renderer or mujoco.Renderer(model, *self._size)
+        self._model, self._renderer = model, renderer
+        data = mujoco.MjData(model)
         data.qpos[:] = env.simulation.qpos[index].numpy()
-        mujoco.mj_forward(self._model, data)
+        mujoco.mj_forward(model, data)
         camera = mujoco.MjvCamera()
         camera.lookat[:] = data.qpos[:3]
         camera.distance, camera.azimuth, camera.elevation = 1.5, 130.0, -15.0
-        self._renderer.update_scene(data, camera)
-        return self._renderer.render().copy()
+        renderer.update_scene(data, camera)
+        return renderer.render().copy()
 
     def close(self) -> None:
         """Release the OpenGL context."""

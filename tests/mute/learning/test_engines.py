@@ -159,6 +159,26 @@ def test_a_training_cannot_be_resumed_with_the_other_engine(tmp_path):
         other.load(str(tmp_path / "model_0.pt"))
 
 
+def test_a_training_of_the_engine_of_an_earlier_version_says_that_its_policy_alone_goes_on(
+    tmp_path,
+):
+    runner = make_runner(tmp_path, iterations=1)
+    runner.train()
+    path = tmp_path / "model_0.pt"
+    saved = torch.load(path, weights_only=True)
+    state = saved["env"]["env"]["simulation"]
+    # It told no version, had shapes that are only to be seen, and kept readings in its state.
+    del state["mujoco"]
+    state["field/geom_friction"] = torch.ones(len(state["qpos"]), 84, 3, dtype=torch.float64)
+    state["integration"] = torch.nn.functional.pad(state["integration"], (0, 100))
+    torch.save(saved, path)
+    with pytest.raises(
+        CheckpointError, match=r"engine of an earlier version.*play and export"
+    ) as e:
+        make_runner(None).load(str(path))
+    assert "\n" not in str(e.value)
+
+
 def test_no_tensor_is_left_to_the_default_device_so_that_all_lie_with_the_engine(tmp_path):
     # A tensor on the device `meta` holds nothing: to compute with it fails, as does mixing devices.
     with torch.device("meta"):
