@@ -1,6 +1,8 @@
 """Step and train one peer in the interpreter that has it, as `benchmark_peers` asks.
 
-    python -P benchmarks/peer_program.py NAME NUM_ENVS TASK
+    python -P benchmarks/peer_program.py NAME NUM_ENVS TASK [DEVICE]
+
+MUTE and mjlab run on a DEVICE that is not the CPU as well.
 
 It prints a line of JSON when the peer is ready: its version and the fields of `peers.parts.Facts`,
 or {"missing": WHY}. After that it answers every line of its input with a line of JSON:
@@ -46,7 +48,7 @@ PROGRAMS = {
 
 def main() -> None:
     """Make the peer that the command line names, and do what is asked."""
-    name, num_envs, task = sys.argv[1:]
+    name, num_envs, task, *device = sys.argv[1:]
     answers = _answers()
     package, module = PROGRAMS[name]
     try:
@@ -56,7 +58,7 @@ def main() -> None:
         return
     # -P leaves the folder out; at the end nothing in it passes for another of the same name.
     sys.path.append(str(Path(__file__).parent))
-    parts: Parts = importlib.import_module(f"peers.{module}").make(int(num_envs), task)
+    parts: Parts = importlib.import_module(f"peers.{module}").make(int(num_envs), task, *device)
     _answer(answers, {"version": version, **vars(parts.facts)})
     environment = _Environment(parts.environment, parts.facts.num_envs)
     for line in sys.stdin:

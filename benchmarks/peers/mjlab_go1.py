@@ -42,6 +42,8 @@ def make(num_envs: int, _task: str, device: str = "cpu") -> Parts:
     @torch.inference_mode()
     def step() -> None:
         env.step(next(actions))
+        if device != "cpu":
+            torch.cuda.synchronize()
 
     def walk_some(trials: int, seconds: float) -> tuple[float, float]:
         trial = _environment(registry, trials, device, fixed_commands=True)[1]

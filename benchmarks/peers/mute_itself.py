@@ -23,7 +23,7 @@ from peers.parts import ACTION_SETS, TARGET_NOISE, Facts, Parts, timed_loop
 __all__ = ["make"]
 
 
-def make(num_envs: int, task: str) -> Parts:
+def make(num_envs: int, task: str, device: str = "cpu") -> Parts:
     """Return a training of a task, without files and displays, and its environment."""
     keep_freed_memory()
     load_plugins()
@@ -31,16 +31,20 @@ def make(num_envs: int, task: str) -> Parts:
     cfg = make_task(name)
     cfg = dataclasses.replace(cfg, env=dataclasses.replace(cfg.env, num_envs=num_envs))
     torch.set_float32_matmul_precision(cfg.agent.matmul_precision)
-    runner = MuteRunner(name, cfg, None)
+    runner = MuteRunner(name, cfg, None, device)
     env = runner.env.env
     actions = itertools.cycle(
-        TARGET_NOISE / cfg.env.action_scale * torch.randn(ACTION_SETS, num_envs, NUM_ACTIONS)
+        TARGET_NOISE
+        / cfg.env.action_scale
+        * torch.randn(ACTION_SETS, num_envs, NUM_ACTIONS, device=device)
     )
 
     @torch.inference_mode()
     def step() -> None:
         use_collection_threads()  # as around every step of a training
         env.step(next(actions))
+        if device != "cpu":
+            torch.cuda.synchronize()
 
     first = itertools.count()
 
@@ -49,7 +53,7 @@ def make(num_envs: int, task: str) -> Parts:
         runner.current_learning_iteration += 1  # rsl_rl counts from the last one again
 
     facts = Facts(
-        engine=f"mujoco {metadata.version('mujoco')}",
+        engine=_engine(device),
         robot="Unitree Go1",
         task=name,
         num_envs=num_envs,
@@ -58,3 +62,8 @@ def make(num_envs: int, task: str) -> Parts:
         note="MUTE itself, with estimator and randomised robots",
     )
     return Parts(facts, step, timed_loop(iteration, num_envs * cfg.agent.num_steps_per_env))
+
+
+def _engine(device: str) -> str:
+    package = "mujoco" if device == "cpu" else "mujoco-warp"
+    return f"{package} {metadata.version(package)} on {device}"

@@ -147,7 +147,9 @@ def peer_pythons(
 class Peer:
     """A process that steps and trains one peer when asked, and nothing otherwise."""
 
-    def __init__(self, name: str, python: Path, num_envs: int, task: str) -> None:
+    def __init__(
+        self, name: str, python: Path, num_envs: int, task: str, device: str = "cpu"
+    ) -> None:
         """Start it and wait until it is ready, which may take minutes.
 
         Args:
@@ -155,6 +157,7 @@ class Peer:
             python: Interpreter that has it.
             num_envs: Robots; Gymnasium takes a number of its own.
             task: Name of the task of MUTE and Gymnasium.
+            device: Where it runs; only MUTE and mjlab know others than the CPU.
         """
         self.rate = PeerRate(name)
         """What is known of it."""
@@ -164,6 +167,7 @@ class Peer:
         self._errors = tempfile.TemporaryFile(mode="w+", errors="replace")  # noqa: SIM115
         # -P keeps the modules beside the program from passing for others of the same name.
         command = [str(python), "-P", str(_PROGRAM), name, str(num_envs), task]
+        command += [device] if device != "cpu" else []
         environment = {key: value for key, value in os.environ.items() if key not in _WAITING}
         pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
         try:
@@ -235,6 +239,7 @@ def time_peers(
     rounds: int,
     task: str,
     begin: Callable[[str], None] = lambda _told: None,
+    device: str = "cpu",
 ) -> list[PeerRate]:
     """Time MUTE and peers in turns; one that cannot run says so in its note.
 
@@ -245,12 +250,13 @@ def time_peers(
         rounds: Rounds that count of each part, after one that does not.
         task: Name of the task of MUTE and Gymnasium.
         begin: Told what begins.
+        device: Where they run, as for a `Peer`.
     """
     peers: list[Peer] = []
     try:
         for name in (ITSELF, *names):
             begin(f"{name} starts")
-            peers.append(Peer(name, pythons[name], num_envs, task))
+            peers.append(Peer(name, pythons[name], num_envs, task, device))
         rates = {part: _rounds(peers, part, rounds, begin) for part in _PARTS}
     finally:
         for peer in peers:
