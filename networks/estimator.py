@@ -13,6 +13,7 @@ from typing import Literal, NamedTuple
 import torch
 from torch import Tensor, nn
 
+from mute.support.precision import hidden_layers
 from mute.support.ranges import Range, check_ranges
 
 from .reflection import Reflection, tie_layer, tie_mlp, tie_vector
@@ -178,7 +179,7 @@ class Estimator(nn.Module):
             obs: Observations. Shape: (N, obs_dim).
             state: Hidden and cell state. Shapes: (N, lstm_hidden).
         """
-        state = self.lstm(obs, state)
+        state = self._consume(obs, state)
         return self._heads(state[0]), state
 
     def unroll(
@@ -216,7 +217,7 @@ class Estimator(nn.Module):
         for step_obs, start, some in zip(obs, starts.unsqueeze(-1), some_start, strict=True):
             if some:
                 state = (state[0].masked_fill(start, 0.0), state[1].masked_fill(start, 0.0))
-            state = self.lstm(step_obs, state)
+            state = self._consume(step_obs, state)
             hiddens.append(state[0])
         return self._heads(torch.stack(hiddens), sample, generator), state
 
@@ -231,6 +232,11 @@ class Estimator(nn.Module):
     def normalised(self, heights: Tensor) -> Tensor:
         """Return heights in m as the height head gives them."""
         return (heights - self.height_offset) / self.height_scale
+
+    def _consume(self, obs: Tensor, state: State) -> State:
+        """Return the state after an observation, float32 even where products are bfloat16."""
+        with hidden_layers(obs.device):
+            return self.lstm(obs, state)
 
     def _heads(
         self, hidden: Tensor, sample: bool = False, generator: torch.Generator | None = None

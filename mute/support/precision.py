@@ -3,8 +3,8 @@
 `agent.matmul_precision` 'medium' allows it. By itself torch then does so on processors with tiles
 (AMX) alone, and keeps to float32 on those that have bfloat16 among their AVX-512 units, where such
 a product takes half the time, and what it reads and writes half the memory. Sums inside a product,
-weights, their optimiser's moments and what is told apart by small differences (means of actions,
-values, losses) stay float32.
+weights, their optimisers' moments, the state of an LSTM and what is told apart by small differences
+(means of actions, values, estimates, losses) stay float32.
 
 Source: Micikevicius et al., "Mixed precision training", 2018; Kalamkar et al., "A study of BFLOAT16
 for deep learning training", 2019.

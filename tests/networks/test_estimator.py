@@ -6,6 +6,7 @@ import math
 
 import pytest
 import torch
+from quick_products import use_bfloat16
 
 from mute.networks import Estimator, EstimatorCfg
 
@@ -273,3 +274,36 @@ def test_starts_of_another_shape_are_refused():
 def test_a_configuration_that_cannot_be_is_refused_by_name(field, value):
     with pytest.raises(ValueError, match=field):
         EstimatorCfg(**{field: value})
+
+
+def test_in_bfloat16_the_state_stays_float32_and_all_is_as_before_within_its_rounding(monkeypatch):
+    estimator = _make_estimator()
+    obs, state, starts = _make_sequence()
+    starts[3, 1] = True
+    results = []
+    for prepare in (lambda _: None, use_bfloat16):
+        prepare(monkeypatch)
+        estimate, last = estimator.unroll(obs, state, starts)
+        loss = estimate.base_lin_vel.square().mean() + estimate.phase.square().mean()
+        weights = [estimator.lstm.weight_ih, estimator.lstm.weight_hh, estimator.lstm.bias_ih]
+        results.append(([*estimate, *last], torch.autograd.grad(loss, weights)))
+    (exact, exact_gradients), (rounded, rounded_gradients) = results
+    assert all(value.dtype == torch.float32 for value in rounded)
+    assert not torch.equal(exact[0], rounded[0])
+    # Gates are off by 2^-9 at most, and forget what they were off by.
+    for one, other in zip(exact, rounded, strict=True):
+        torch.testing.assert_close(one, other, rtol=0.0, atol=0.02)
+    for one, other in zip(exact_gradients, rounded_gradients, strict=True):
+        assert (one - other).norm() < 0.02 * one.norm()
+
+
+def test_in_bfloat16_unrolling_a_sequence_agrees_with_stepping_through_it(monkeypatch):
+    use_bfloat16(monkeypatch)
+    estimator = _make_estimator()
+    obs, state, starts = _make_sequence()
+    unrolled, last = estimator.unroll(obs, state, starts)
+    for t in range(NUM_STEPS):
+        estimate, state = estimator.step(obs[t], state)
+        for stepped, sequence in zip(estimate, unrolled, strict=True):
+            torch.testing.assert_close(stepped, sequence[t], atol=1e-6, rtol=0)
+    torch.testing.assert_close(state, last, atol=1e-6, rtol=0)

@@ -26,7 +26,12 @@ def _starts(alg) -> torch.Tensor:
     return torch.cat((torch.zeros_like(dones[:1]), dones[:-1]))
 
 
-def test_re_unrolled_over_the_storage_the_estimator_reproduces_the_stored_estimates():
+@pytest.mark.parametrize("quick", [False, True])
+def test_re_unrolled_over_the_storage_the_estimator_reproduces_the_stored_estimates(
+    monkeypatch, quick
+):
+    if quick:
+        use_bfloat16(monkeypatch)
     runner = make_runner(iterations=3)
     alg, estimator = runner.alg, runner.env.estimator
     ended, errors = [], []
