@@ -8,13 +8,15 @@ from typing import Any
 
 import mujoco
 
+from mute.support.errors import MuteError
+
 __all__ = ["SceneError", "dress_in_menagerie"]
 
 _VISUAL_GROUP = 2
 """Geom group of shapes only looked at; collision shapes are in group 3, hidden by default."""
 
 
-class SceneError(RuntimeError):
+class SceneError(MuteError):
     """Raised where a scene needs something that this machine does not have."""
 
 

@@ -40,7 +40,6 @@ from mute.command_lines.sound_options import (
 from mute.controllers import LearnedController, load_policy
 from mute.controllers.command import COMMAND_LIMITS, Command
 from mute.controllers.learned import Policy
-from mute.envs.menagerie import SceneError
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.scene import Look
 from mute.evaluation.session import Session
@@ -60,9 +59,8 @@ __all__ = ["PlayArgs", "main"]
 _DEFAULT_SECONDS = 20.0
 _STAND_TIME = 0.5
 """Time that robots stand before they get the command, s; a quarter of a shorter walk."""
-_SETTLE_TIME = 1.5
-"""Time after the start, standing included, that the figures leave out, s; half of a shorter
-walk."""
+_SETTLE_TIME = 1.0
+"""Time with the command that the figures leave out at first, s; half of a shorter walk."""
 _SURFACE = "wood"
 """Floor that is heard, and walked on where sound is kept, unless one is named."""
 
@@ -89,10 +87,13 @@ class PlayArgs(PolicyArgs):
     seconds: float | None = None
     """Time to walk, s; 20 unless given, or until the window is closed."""
     seed: int = 0
-    """Seed of the first states, where there are several robots, and of the noise in the sound."""
+    """Seed of the first states and of the noise in the sound."""
     num_envs: int = 1
-    """Number of robots; the first is shown and heard, all other figures are of all. One begins in
-    the exact stance, several each in one a little different."""
+    """Number of robots; the first is shown and heard, all other figures are of all."""
+    begin: Literal["moving", "standing"] = "moving"
+    """How robots begin: moving, near the stance with a little speed in any direction, as in
+    training; standing, at rest in the exact stance (several robots each a little beside it), with
+    the command half a second later."""
     surface: str | None = None
     """Floor to walk on and to hear, with physics at 1 ms: wood, carpet, tile or concrete. Unless
     given, training's floor and physics, with a level (modelled, sounding as wood); with --wav or
@@ -224,8 +225,8 @@ def _wants_window(args: PlayArgs) -> bool:
 def _make_session(args: PlayArgs, endless: bool) -> Session:
     policy = load_policy(args.with_policy_found().policy)
     seconds = LONGEST_WALK if endless else args.seconds or _DEFAULT_SECONDS
-    settle_time = min(_SETTLE_TIME, 0.5 * seconds)
-    stand_time = min(_STAND_TIME, 0.25 * seconds)
+    stand_time = min(_STAND_TIME, 0.25 * seconds) if args.begin == "standing" else 0.0
+    settle_time = min(stand_time + _SETTLE_TIME, 0.5 * seconds)
     env = _make_env(args, policy, seconds)
     listener = _make_listener(args, env, settle_time)
     _print_header(args, policy)
@@ -237,26 +238,22 @@ def _make_env(args: PlayArgs, policy: Policy, seconds: float) -> QuadrupedEnv:
     """Return the robots, on a floor and with physics that can be heard if that is wanted.
 
     Raises:
-        MuteError: If the robot cannot look as asked, or the policy's rate goes with no floor.
+        MuteError: If the policy's rate goes with no floor.
     """
     cfg = evaluation_cfg(policy.cfg.env, args.num_envs, seconds, args.seed)
-    # All walk along x, so that the camera has the same view of every walk; and all begin at rest,
-    # as a user's robot does. Of several, each stands a little differently.
-    joint_noise = cfg.initial_joint_noise if args.num_envs > 1 else 0.0
-    cfg = dataclasses.replace(
-        from_the_stance(cfg),
-        initial_joint_noise=joint_noise,
-        scene=dataclasses.replace(cfg.scene, look=args.look),
-    )
+    if args.begin == "standing":
+        # Of several, each stands a little differently.
+        joint_noise = cfg.initial_joint_noise if args.num_envs > 1 else 0.0
+        cfg = dataclasses.replace(from_the_stance(cfg), initial_joint_noise=joint_noise)
+    # All walk along x, so that the camera has the same view of every walk.
+    scene = dataclasses.replace(cfg.scene, look=args.look)
+    cfg = dataclasses.replace(cfg, random_heading=False, scene=scene)
     if args.floor or not args.json:
         try:
             cfg = audible_cfg(cfg, args.floor)
         except ValueError as error:
             raise MuteError(f"--surface {args.floor}: {error}") from error
-    try:
-        return QuadrupedEnv(cfg)
-    except SceneError as error:
-        raise MuteError(str(error)) from error
+    return QuadrupedEnv(cfg)
 
 
 def _make_listener(args: PlayArgs, env: QuadrupedEnv, settle_time: float) -> LiveListener | None:

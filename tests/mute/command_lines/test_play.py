@@ -252,7 +252,16 @@ def _first_frames(policy: Path, monkeypatch: pytest.MonkeyPatch, *words: str) ->
 
     monkeypatch.setattr(Session, "step", noted)
     run = _play_here(
-        "--policy", str(policy), "--viewer", "none", "--seconds", "1", "--json", *words
+        "--policy",
+        str(policy),
+        "--viewer",
+        "none",
+        "--seconds",
+        "1",
+        "--json",
+        "--begin",
+        "standing",
+        *words,
     )
     assert run.returncode == 0, run.stderr
     return frames
