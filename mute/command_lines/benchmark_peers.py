@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import os
 import statistics
 import subprocess
@@ -25,9 +24,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scipy.stats import quantile_test
-
 from mute.command_lines.arguments import check_distinct
+from mute.evaluation.intervals import median_interval
 from mute.support.errors import MuteError
 from mute.support.provenance import REPOSITORY
 
@@ -298,9 +296,9 @@ def _note(peer: Peer, part: str, error: str) -> None:
 def _sum_up(peer: Peer, part: str, rates: Sequence[float], own: Sequence[float]) -> None:
     if not rates:
         return
-    setattr(peer.rate, part, statistics.median(rates))
-    bounds = quantile_test(rates, p=0.5).confidence_interval(confidence_level=0.95)
-    peer.rate.intervals[part] = [None if math.isnan(bound) else float(bound) for bound in bounds]
+    interval = median_interval(rates)
+    setattr(peer.rate, part, interval.median)
+    peer.rate.intervals[part] = [interval.low, interval.high]
     peer.rate.rounds[part] = len(rates)
     # The rounds of one that ends early are the first ones.
     shares = [one / other for one, other in zip(rates, own, strict=False)]
