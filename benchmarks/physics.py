@@ -98,8 +98,13 @@ def _two_longer_steps(cfg: QuadrupedEnvCfg) -> QuadrupedEnvCfg:
     return dataclasses.replace(cfg, scene=scene, decimation=2)
 
 
-def _with_islands(spec: mujoco.MjSpec) -> None:
-    spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+def _with(disabled: mujoco.mjtDisableBit) -> SpecEdit:
+    """Return an edit that enables what the scene leaves out."""
+
+    def edit(spec: mujoco.MjSpec) -> None:
+        spec.option.disableflags &= ~int(disabled)
+
+    return edit
 
 
 def _only_feet_collide(spec: mujoco.MjSpec) -> None:
@@ -112,7 +117,8 @@ AS_IT_IS = Variant("as it is")
 VARIANTS = (
     AS_IT_IS,
     Variant("with the shapes that are only to be seen", pictured=True),
-    Variant("with a search for islands", spec=_with_islands),
+    Variant("with a search for islands", spec=_with(mujoco.mjtDisableBit.mjDSBL_ISLAND)),
+    Variant("with trees of boxes around shapes", spec=_with(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)),
     Variant("hips, thighs and shanks touch nothing", spec=_only_feet_collide),
     Variant("without dry friction in the joints", cfg=_without_dry_friction),
     Variant("at most 5 solver iterations", cfg=_scene(iterations=5)),

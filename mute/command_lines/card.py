@@ -100,6 +100,7 @@ def read_benchmarks(args: CardArgs) -> BenchmarkFiles:
         training=_read(args.benchmark),
         peers=_read(docs / "peers.json"),
         sound=_read(args.noise.parent / "benchmark.json"),
+        physics=_read(docs / "physics.json"),
     )
 
 

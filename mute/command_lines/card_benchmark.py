@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mute.command_lines.benchmark_figures import CAPTIONS, PARTS, with_interval
+from mute.command_lines.card_physics import physics_section
 from mute.command_lines.card_tables import markdown
 
 __all__ = ["BenchmarkFiles", "benchmark_page"]
@@ -56,11 +57,15 @@ class BenchmarkFiles:
     """Peers on another machine."""
     sound: Mapping[str, Any]
     """What it takes to hear robots."""
+    physics: Mapping[str, Any]
+    """What parts of the physics cost."""
 
 
 def benchmark_page(files: BenchmarkFiles) -> str:
     """Return the whole page."""
-    return "\n\n".join((_head(), _training(files.training), _peers(files), _sound(files))) + "\n"
+    physics = physics_section(files.physics)
+    parts = (_head(), _training(files.training), physics, _peers(files), _sound(files))
+    return "\n\n".join(parts) + "\n"
 
 
 def _head() -> str:

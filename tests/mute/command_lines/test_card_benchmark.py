@@ -16,6 +16,22 @@ _SOUND = {
     "memory_mb": 1.0,
     "memory_growth_mb": 0.0,
 }
+_PHYSICS = {
+    "num_envs": 1024,
+    "turns": 6,
+    "machine": "a machine of physics",
+    "mujoco": "4.0.0",
+    "rates": [
+        {"variant": "as it is", "speed": 1.0, "speed_low": 1.0, "speed_high": 1.0},
+        {"variant": "with more", "speed": 0.5, "speed_low": 0.25, "speed_high": 0.75},
+    ],
+    "fidelity": [
+        {"variant": "as it is", "beta": beta, "landing_speed": 0.01, "force_rms": beta / 10.0,
+         "peak_force": 0.0, "work": -0.5}
+        for beta in (0.0, 1.0)
+    ],
+    "touching": [{"shape": "foot", "policy": 1.0, "beginning": 0.25}],
+}  # fmt: skip
 _PEER = {"version": "1.0", "num_envs": 8, "environment": 6000.0, "note": "steps something"}
 
 
@@ -45,7 +61,9 @@ def _measured() -> dict:
 
 def _page(measured: dict) -> str:
     peers = {"machine": "a machine of peers", "peers": [_PEER | {"name": "mjlab"}]}
-    return benchmark_page(BenchmarkFiles(training=measured, peers=peers, sound=_SOUND))
+    return benchmark_page(
+        BenchmarkFiles(training=measured, peers=peers, sound=_SOUND, physics=_PHYSICS)
+    )
 
 
 def _lines(page: str) -> list[list[str]]:
@@ -103,3 +121,15 @@ def test_peers_stand_with_the_machine_that_each_was_timed_on():
     assert "On a machine (`docs/benchmark.json`):\n\n| peer" in page
     assert "On a machine of peers (`docs/peers.json`):\n\n| peer" in page
     assert "| gymnasium | 1.0 | - | - | - | - | 8 | 6,000 | - | steps something |" in page
+
+
+def test_what_the_physics_costs_stands_beside_what_it_changes():
+    page = _page(_measured())
+    assert (
+        "| as it is | 1.00 | +1.0%, +1.0% | +0.0%, +10.0% | +0.0%, +0.0% | -50.0%, -50.0% |" in page
+    )
+    assert "| with more | 0.50 [0.25, 0.75] | - | - | - | - |" in page
+    assert (
+        "under that policy foot 100.0%; under random actions, as a training begins, foot 25.0%."
+        in page
+    )
