@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -24,6 +25,9 @@ _READ = ("sensordata", "actuator_force")
 _VERSION = tuple(int(part) for part in mujoco.__version__.split(".")[:3])
 """Version of MuJoCo, saved with a state."""
 
+_MANY_SHAPES = 8
+"""Shapes of a body from which on it may pay to look first which of them are near."""
+
 _STAGES: dict[Stage, int] = {
     "positions": int(mujoco.mjtStage.mjSTAGE_POS),
     "all": int(mujoco.mjtStage.mjSTAGE_ACC),
@@ -34,23 +38,23 @@ class BatchSimulation:
     """MuJoCo on a CPU thread pool (`mujoco.batch.Batch`), see `Simulation`.
 
     Physics runs in float64 and its state stays so; the tensors are copies in float32. Before every
-    call what has been written into them reaches the state, and nothing else does: a robot that
-    nobody touched keeps its state to the last bit.
+    call what has been changed in them reaches the state, and nothing else does: a robot that nobody
+    touched keeps its state to the last bit.
     """
 
-    def __init__(self, model: mujoco.MjModel, num_envs: int, num_threads: int = 0) -> None:
+    def __init__(self, model: mujoco.MjModel, num_envs: int, num_threads: int = 1) -> None:
         """Allocate the simulations.
 
         Args:
             model: The compiled model; it is copied.
             num_envs: Number of simulations.
-            num_threads: Size of the thread pool; 0 takes every logical CPU.
+            num_threads: Size of the thread pool, 1 or more.
         """
         self.model = model
         self.num_envs = num_envs
         self.device = torch.device("cpu")
         self.substeps: dict[str, torch.Tensor] = {}
-        self._batch = Batch(model, num_envs, num_threads)
+        self._batch = Batch(_stepped(model), num_envs, num_threads)
         self._own = {name: self._batch.bind(name) for name in (*_WRITTEN, *_READ)}
         self._shown = {name: own.astype(np.float32) for name, own in self._own.items()}
         self._seen = {name: self._shown[name].copy() for name in _WRITTEN}
@@ -73,11 +77,9 @@ class BatchSimulation:
 
     def step(self, num_steps: int = 1) -> None:
         """Advance every simulation by a number of physics steps."""
+        self._make_room(num_steps)
         with self._calling():
-            if not self._recorded:
-                self._batch.step(nstep=num_steps)
-                return
-            self._make_room(num_steps)
+            # Unlike `Batch.step`, a rollout ends for a simulation that MuJoCo warns of.
             self._batch.rollout(num_steps, record=self._recorded, out=self._records)
 
     def forward(self, mask: torch.Tensor | None = None, stage: Stage = "all") -> None:
@@ -94,8 +96,7 @@ class BatchSimulation:
 
     def unstable(self) -> torch.Tensor:
         """Return which simulations blew up since their last reset. Shape: (num_envs,)."""
-        # Of whatever kind, a warning means that numbers were bad or contacts were lost, and has
-        # ended the call for its simulation.
+        # Of whatever kind, a warning means that numbers were bad or contacts were lost.
         warned = (self._warnings[:, :, 1] > 0).any(dim=1)
         # Negated, so that NaN counts as too fast.
         too_fast = ~(self.qvel.abs().amax(dim=1) < MAX_SPEED)
@@ -116,9 +117,8 @@ class BatchSimulation:
         state = saved_fields(self._fields)
         state["mujoco"] = torch.tensor(_VERSION)
         state["integration"] = torch.from_numpy(self._state.copy())
-        # A push written since the last step reaches the engine's own state in the next one only.
-        state["qpos"], state["qvel"] = self.qpos.clone(), self.qvel.clone()
-        return state
+        # What was written since the last call reaches the engine's own state in the next one only.
+        return state | {name: torch.from_numpy(self._shown[name].copy()) for name in _WRITTEN}
 
     def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
         """Continue from a `state_dict`.
@@ -137,6 +137,12 @@ class BatchSimulation:
                 "simulation state is of the engine of an earlier version, whose trainings cannot go"
                 " on here; their policies play and export as before"
             )
+        version = tuple(state["mujoco"].tolist())
+        if version[:2] != _VERSION[:2]:
+            raise ValueError(
+                f"simulation state is of MuJoCo {'.'.join(map(str, version))}, this is "
+                f"{mujoco.__version__}: go on with the version that it was saved with"
+            )
         integration = state["integration"].numpy()
         if integration.shape != self._state.shape:
             raise ValueError(
@@ -152,8 +158,8 @@ class BatchSimulation:
         self.forward()
         # The solver's warm start is part of the state, and `forward` has just moved it.
         self._state[:] = integration
-        self.qpos.copy_(state["qpos"])
-        self.qvel.copy_(state["qvel"])
+        for name in _WRITTEN:
+            np.copyto(self._shown[name], state[name].numpy())
 
     @contextmanager
     def _calling(self) -> Iterator[None]:
@@ -168,6 +174,8 @@ class BatchSimulation:
             # An engine error (an exhausted arena, say) leaves the failing simulations where they
             # were; all others have done what they were to do.
             self._failed[error.ids] = True
+            for name, rows in self._records.items():
+                rows[error.ids] = self._batch.bind(name)[error.ids, np.newaxis]
         self._show()
 
     def _show(self) -> None:
@@ -178,7 +186,9 @@ class BatchSimulation:
 
     def _make_room(self, num_steps: int) -> None:
         """Allocate the arrays that `rollout` records into, unless they are there."""
-        if self._records and next(iter(self._records.values())).shape[1] == num_steps:
+        if not self._recorded or (
+            self._records and next(iter(self._records.values())).shape[1] == num_steps
+        ):
             return
         # State components bind as parts of wider rows, so widths alone are taken from them.
         self._records = {
@@ -186,6 +196,19 @@ class BatchSimulation:
             for name in self._recorded
         }
         self.substeps = {name: torch.from_numpy(rows) for name, rows in self._records.items()}
+
+
+def _stepped(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Return the model as it is stepped: without trees of boxes around shapes, where these are few.
+
+    A limb has one or two shapes, and a floor often one. To test them all is quicker then, and the
+    contacts are the same. MuJoCo Warp has no such trees, and refuses the flag.
+    """
+    if model.body_geomnum.max() > _MANY_SHAPES:
+        return model
+    model = copy.copy(model)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
+    return model
 
 
 def _ids(mask: torch.Tensor | None) -> np.ndarray | None:

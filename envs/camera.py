@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from .picture import Picture
 from .quadruped_env import QuadrupedEnv
-from .scene import build_scene
 
 __all__ = ["Camera"]
 
@@ -17,22 +17,20 @@ class Camera:
     def __init__(self, width: int, height: int) -> None:
         """Choose the size of a picture, pixels."""
         self._size = (height, width)
-        self._model: mujoco.MjModel | None = None
+        self._picture: Picture | None = None
         self._renderer: mujoco.Renderer | None = None
 
     def frame(self, env: QuadrupedEnv, index: int) -> np.ndarray:
         """Return a picture of one robot, uint8. Shape: (height, width, 3)."""
         # Every seed has a model of its own, but all look the same.
-        model = self._model or build_scene(env.cfg.scene)
-        renderer = self._renderer or mujoco.Renderer(model, *self._size)
-        self._model, self._renderer = model, renderer
-        data = mujoco.MjData(model)
-        data.qpos[:] = env.simulation.qpos[index].numpy()
-        mujoco.mj_forward(model, data)
+        picture = self._picture or Picture(env)
+        renderer = self._renderer or mujoco.Renderer(picture.model, *self._size)
+        self._picture, self._renderer = picture, renderer
+        picture.show(env.simulation.qpos[index])
         camera = mujoco.MjvCamera()
-        camera.lookat[:] = data.qpos[:3]
+        camera.lookat[:] = picture.data.qpos[:3]
         camera.distance, camera.azimuth, camera.elevation = 1.5, 130.0, -15.0
-        renderer.update_scene(data, camera)
+        renderer.update_scene(picture.data, camera)
         return renderer.render().copy()
 
     def close(self) -> None:

@@ -67,7 +67,8 @@ class Simulation(Protocol):
         """Keep in `substeps`, from the next `step` on, what arrays hold in its physics steps.
 
         Args:
-            names: Some of the tensors above; those that were recorded before still are.
+            names: Some of the tensors above; those that were recorded before still are, as long
+                as the simulations live.
         """
         ...
 
@@ -80,7 +81,8 @@ class Simulation(Protocol):
 
         Args:
             mask: Simulations to do that for; None for all. Shape: (num_envs,).
-            stage: How far to go. After `positions` only the sensors of positions are current.
+            stage: How far to go. After `positions` the sensors of positions are current; all other
+                readings of these simulations mean nothing.
         """
         ...
 

@@ -145,8 +145,9 @@ class AgentCfg:
     std_range: tuple[float, float] = (0.05, 1.2)
     """Bounds on it; unbounded, the entropy bonus can blow it up."""
     matmul_precision: Literal["highest", "high", "medium"] = "medium"
-    """torch's float32 matrix products, everywhere in a run: 'medium' lets processors that have
-    bfloat16 units use them."""
+    """torch's float32 matrix products in a training: 'medium' lets processors that have bfloat16
+    units use them, those with tiles (AMX) for all products, those with AVX-512 units for hidden
+    layers and the LSTM."""
     ppo: PPOCfg = field(default_factory=PPOCfg)
     """The algorithm."""
     estimation: EstimationCfg = field(default_factory=EstimationCfg)

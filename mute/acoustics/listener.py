@@ -140,8 +140,8 @@ class Listener:
         """
         with self._closing:
             self._recorder.close()
-            # What was interrupted may have left half a control step behind. Then the rest, less
-            # than a stretch, is given up.
+            # What was interrupted may have left a control step that nobody has listened to. Then
+            # the rest, less than a stretch, is given up.
             if exc_type is None:
                 self._work()
 

@@ -33,7 +33,6 @@ from mute.command_lines.reward_options import (
     without_unused_terms,
 )
 from mute.config import AgentCfg, TaskCfg, from_plain, to_plain
-from mute.envs.menagerie import SceneError
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.evaluation.noise_probe import NoiseProbe
 from mute.learning.displays import LiveDisplay, PlainDisplay
@@ -211,7 +210,7 @@ def _make_runner(
     shown = on_iteration if ranks.first else None
     try:
         return MuteRunner(args.task, cfg, run_dir, ranks.device(kind), shown, ranks, NoiseProbe())
-    except (ValueError, SceneError) as error:
+    except ValueError as error:
         raise MuteError(str(error)) from error
 
 

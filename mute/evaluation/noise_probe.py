@@ -17,6 +17,7 @@ from mute.acoustics.audible_env import listening_cfg
 from mute.acoustics.gains import load_gains
 from mute.controllers.learned import Policy, make_policy
 from mute.evaluation.noise_levels import NoiseSetting, measure_noise
+from mute.support.precision import full_precision
 
 __all__ = ["NoiseProbe"]
 
@@ -60,8 +61,16 @@ class NoiseProbe:
         except ValueError:
             return {}
         settings = [NoiseSetting(beta, _SPEED) for beta in (0.0, 1.0)]
-        rows = measure_noise(
-            policy, _SURFACE, settings, _TRIALS, _SECONDS, _SEED, self._gains, from_energies=True
-        )
+        with full_precision():
+            rows = measure_noise(
+                policy,
+                _SURFACE,
+                settings,
+                _TRIALS,
+                _SECONDS,
+                _SEED,
+                self._gains,
+                from_energies=True,
+            )
         levels = {f"Noise/level_beta_{row.beta:g}": row.mnl_mean for row in rows}
         return {name: level for name, level in levels.items() if not math.isnan(level)}

@@ -42,6 +42,9 @@ def walk_figures(policy: Policy, cfg: QuadrupedEnvCfg, beta: float) -> dict[str,
     Returns:
         `landing_speed` (RMS, m/s), `force_rms` (vertical contact force of a foot, N), `peak_force`
         (mean over feet and windows of half a second, N) and `work` (mean mechanical power, W).
+
+    Raises:
+        RuntimeError: If a simulation blew up.
     """
     env = QuadrupedEnv(
         dataclasses.replace(cfg, scene=dataclasses.replace(cfg.scene, foot_forces=True))
@@ -59,6 +62,8 @@ def walk_figures(policy: Policy, cfg: QuadrupedEnvCfg, beta: float) -> dict[str,
     command = torch.tensor([_SPEED, 0.0, 0.0, beta])
     steps = round(cfg.episode_length / env.step_dt) - 1
     gait = run_trial(env, LearnedController(policy, cfg.num_envs), command, steps).gait()
+    if gait.unstable:
+        raise RuntimeError(f"{gait.unstable} simulations blew up: their steps are no walk's")
     first, window = (round(time / cfg.scene.timestep) for time in (_SETTLE, _WINDOW))
     force = torch.cat(forces)[first:]
     windows = force[: len(force) // window * window].unflatten(0, (-1, window))

@@ -2,7 +2,8 @@
 
 rsl_rl draws one permutation for an update, so that all its epochs see the same mini-batches. Here
 each is gathered once and kept for the epochs, with the networks' inputs, normalised and joined:
-the normalisers learn only after the update. The batches are bit for bit those of rsl_rl.
+the normalisers learn only after the update. The batches are bit for bit those of rsl_rl, but for
+the networks' inputs where these are in bfloat16 (`mute.support.precision`).
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from typing import Any
 import mujoco
 import mujoco.viewer
 
-from mute.envs.scene import build_scene
+from mute.envs.picture import Picture
 from mute.evaluation.session import Session
 from mute.live.keys import press
 from mute.support.errors import MuteError
@@ -42,22 +42,20 @@ def watch(session: Session, num_steps: int | None, captions: Callable[[], dict[s
         MuteError: If this Python cannot open windows (on macOS, that is mjpython's alone).
     """
     env, keys = session.env, queue.SimpleQueue[int]()
-    model = build_scene(env.cfg.scene)
-    data = mujoco.MjData(model)
-    data.qpos[:] = env.simulation.qpos[0].numpy()
+    picture = Picture(env)
+    picture.show(env.simulation.qpos[0])
     per_second = round(1.0 / env.step_dt)
     due = time.perf_counter()
-    with _open(model, data, keys.put) as viewer:
+    with _open(picture.model, picture.data, keys.put) as viewer:
         viewer.cam.type = mujoco.mjtCamera.mjCAMERA_TRACKING
-        viewer.cam.trackbodyid = model.body("trunk").id
+        viewer.cam.trackbodyid = picture.model.body("trunk").id
         viewer.cam.azimuth, viewer.cam.elevation, viewer.cam.distance = 125.0, -14.0, 1.5
         while viewer.is_running() and (num_steps is None or session.steps < num_steps):
             while not keys.empty():
                 press(session, keys.get())
             session.step()
             with viewer.lock():
-                data.qpos[:] = env.simulation.qpos[0].numpy()
-                mujoco.mj_forward(model, data)
+                picture.show(env.simulation.qpos[0])
             if session.steps % per_second == 0:
                 shown = captions()
                 viewer.set_texts((None, None, "\n".join(shown), "\n".join(shown.values())))

@@ -19,8 +19,8 @@ import imageio_ffmpeg
 import mujoco
 import numpy as np
 
+from mute.envs.picture import Picture
 from mute.envs.quadruped_env import QuadrupedEnv
-from mute.envs.scene import build_scene
 from mute.rendering.encoder import ffmpeg_program
 from mute.rendering.sound_track import add_sound
 from mute.support.errors import MuteError
@@ -78,13 +78,12 @@ class Video:
         self._temporary = _temporary_name(path)
         self._steps = -round(start / env.step_dt)
         self._pictures = 0
-        self._model = build_scene(env.cfg.scene)
-        self._renderer, software = _make_renderer(self._model)
+        self._robot_picture = Picture(env)
+        self._renderer, software = _make_renderer(self._robot_picture.model)
         rate = min(_SOFTWARE_RATE, 1.0 / env.step_dt) if software else 1.0 / env.step_dt
         self._stride = max(1, round(1.0 / (rate * env.step_dt)))
         self.frame_rate = 1.0 / (self._stride * env.step_dt)
         """Pictures a second: one a control step, fewer where the processor has to render."""
-        self._data = mujoco.MjData(self._model)
         self._camera = mujoco.MjvCamera()
         self._camera.elevation, self._camera.distance = -14.0, 1.5
 
@@ -171,9 +170,8 @@ class Video:
 
     def _picture(self) -> np.ndarray:
         """Return the robot as it stands now. Shape: (height, width, 3), uint8."""
-        simulation, data = self._env.simulation, self._data
-        data.qpos[:] = simulation.qpos[self._robot].numpy()
-        mujoco.mj_forward(self._model, data)
+        self._robot_picture.show(self._env.simulation.qpos[self._robot])
+        data = self._robot_picture.data
         if not self._pictures:  # the view of a walk is the same whatever way it begins
             forward = self._env.heading[self._robot]
             self._camera.azimuth = _AZIMUTH + math.degrees(math.atan2(forward[1], forward[0]))

@@ -460,3 +460,16 @@ def test_a_patch_stiffer_than_the_physics_steps_allow_is_refused_by_its_index():
     SceneCfg(timestep=0.004, floor_patches=(soft, hard))
     with pytest.raises(ValueError, match=r"floor_patches\[1\]\.solref\[0\] must be >= 0\.01"):
         SceneCfg(timestep=0.005, floor_patches=(soft, hard))
+
+
+def test_a_scene_that_nobody_sees_has_the_shapes_that_collide_and_the_same_physics():
+    seen, stepped = build_scene(SceneCfg()), build_scene(SceneCfg(), pictured=False)
+    collides = (seen.geom_contype != 0) | (seen.geom_conaffinity != 0)
+    assert stepped.ngeom == collides.sum() == 19
+    assert seen.ngeom > 3 * stepped.ngeom
+    assert (stepped.nlight, stepped.ntex, stepped.nmat) == (0, 0, 0)
+    for name in ("body_mass", "body_inertia", "body_pos", "jnt_range", "dof_armature", "site_pos",
+                 "dof_frictionloss", "actuator_gainprm", "sensor_adr", "key_qpos"):  # fmt: skip
+        np.testing.assert_array_equal(getattr(stepped, name), getattr(seen, name), name)
+    for name in ("geom_size", "geom_friction", "geom_solref", "geom_pos"):
+        np.testing.assert_array_equal(getattr(stepped, name), getattr(seen, name)[collides], name)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import math
 
-import mujoco
 import pytest
 import torch
 from mujoco.batch import SimulationError
@@ -231,6 +230,21 @@ def test_an_engine_error_is_an_unstable_simulation_and_stops_nothing():
     assert not simulation.unstable().any()
 
 
+def test_a_simulation_with_an_engine_error_records_where_it_was_before_the_call():
+    simulation = _make_in_a_small_arena()
+    simulation.record("qpos", "qvel")
+    simulation.step(8)
+    simulation.qpos[0, 2], simulation.qvel[0, 2] = 0.2, -6.0  # it fails on the way down
+    before = simulation.qpos[0].double()
+    simulation.step(8)
+    assert simulation.unstable().tolist() == [True, False]
+    for row in simulation.substeps["qpos"][0]:
+        torch.testing.assert_close(row, before, rtol=0.0, atol=1e-6)
+    falling = simulation.substeps["qvel"][:, :, 2]
+    assert (falling[0] == -6.0).all()
+    assert torch.equal(simulation.substeps["qpos"][1, -1].float(), simulation.qpos[1])
+
+
 def test_a_loaded_state_continues_bit_for_bit(make_standing):
     simulation = make_standing()
     simulation.field("geom_friction")[1, :, 0] = 0.3
@@ -266,6 +280,26 @@ def test_a_state_that_is_loaded_over_a_simulation_that_blew_up_is_stable_again(
     assert not simulation.unstable().any()
     for index in range(2):
         _assert_same(_tensors(simulation, index), _tensors(twin, index))
+
+
+def test_what_was_written_since_the_last_call_is_part_of_a_saved_state():
+    simulation, twin = _make_standing(), _make_standing()
+    simulation.step(3)
+    simulation.ctrl += 0.3
+    simulation.qvel[0, 0] += 0.5
+    twin.load_state_dict(simulation.state_dict())
+    for each in (simulation, twin):
+        each.step(2)
+    for index in range(2):
+        _assert_same(_tensors(twin, index), _tensors(simulation, index))
+
+
+def test_a_state_of_another_mujoco_is_refused():
+    simulation = _make_standing()
+    state = simulation.state_dict()
+    state["mujoco"] = torch.tensor([4, 7, 1])
+    with pytest.raises(ValueError, match=r"MuJoCo 4\.7\.1, this is"):
+        simulation.load_state_dict(state)
 
 
 def test_a_saved_state_does_not_change_afterwards(make_standing):
@@ -339,8 +373,3 @@ def test_positions_alone_make_the_sensors_of_positions_current():
     raised = simulation.sensordata[:, columns] - before
     assert (raised[0] == 0.0).all()
     torch.testing.assert_close(raised[1, 2::3], torch.full((4,), 0.25), atol=1e-6, rtol=0.0)
-
-
-def test_a_state_tells_the_version_of_mujoco_that_it_is_of():
-    version = _make_standing().state_dict()["mujoco"]
-    assert ".".join(str(part) for part in version.tolist()) == mujoco.__version__

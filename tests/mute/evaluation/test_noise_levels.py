@@ -9,6 +9,7 @@ import re
 import pytest
 import torch
 from places import SHIPPED_POLICY
+from quick_products import use_bfloat16
 from scipy import stats
 
 from mute.acoustics import listener
@@ -25,6 +26,7 @@ from mute.evaluation.noise_probe import NoiseProbe
 from mute.evaluation.paper_levels import PAPER_LEVELS
 from mute.rendering.kept_walks import KeptWalks
 from mute.support.errors import MuteError
+from mute.support.precision import hidden_dtype
 
 
 def _measure(seed: int, trials: int = 5, seconds: float = 3.0, **options) -> list[NoiseRow]:
@@ -134,6 +136,20 @@ def test_a_probe_of_a_training_is_near_the_table_and_draws_no_random_number(rows
     assert torch.equal(torch.get_rng_state(), before)
     expected = {f"Noise/level_beta_{row.beta:g}": row.mnl_mean for row in rows}
     assert levels == pytest.approx(expected, abs=1.0)
+
+
+def test_a_probe_walks_in_full_precision_whatever_the_training_computes_in(monkeypatch):
+    asked = []
+
+    def note(*_, **__) -> list[NoiseRow]:
+        asked.append(hidden_dtype(torch.device("cpu")))
+        return []
+
+    use_bfloat16(monkeypatch)
+    monkeypatch.setattr(noise_probe, "measure_noise", note)
+    NoiseProbe().measure(load_policy(SHIPPED_POLICY))
+    assert asked == [torch.float32]
+    assert hidden_dtype(torch.device("cpu")) == torch.bfloat16
 
 
 def test_a_training_that_measures_no_noise_needs_no_calibration(monkeypatch):

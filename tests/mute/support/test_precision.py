@@ -6,7 +6,7 @@ import pytest
 import torch
 from quick_products import use_bfloat16
 
-from mute.support.precision import hidden_dtype, hidden_layers
+from mute.support.precision import full_precision, hidden_dtype, hidden_layers
 
 
 @pytest.mark.parametrize(
@@ -36,3 +36,12 @@ def test_layers_compute_in_bfloat16_inside_the_context_and_as_before_outside(mon
     torch.set_float32_matmul_precision("highest")
     with hidden_layers(value.device):
         assert layer(value).dtype == torch.float32
+
+
+def test_full_precision_is_for_a_while_and_ends_with_an_error_too(monkeypatch):
+    use_bfloat16(monkeypatch)
+    device = torch.device("cpu")
+    with pytest.raises(RuntimeError), full_precision():
+        assert hidden_dtype(device) == torch.float32
+        raise RuntimeError
+    assert hidden_dtype(device) == torch.bfloat16
