@@ -118,7 +118,6 @@ VARIANTS = (
     AS_IT_IS,
     Variant("with the shapes that are only to be seen", pictured=True),
     Variant("with a search for islands", spec=_with(mujoco.mjtDisableBit.mjDSBL_ISLAND)),
-    Variant("with trees of boxes around shapes", spec=_with(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)),
     Variant("hips, thighs and shanks touch nothing", spec=_only_feet_collide),
     Variant("without dry friction in the joints", cfg=_without_dry_friction),
     Variant("at most 5 solver iterations", cfg=_scene(iterations=5)),
