@@ -13,7 +13,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -65,7 +65,7 @@ class PeerWalksArgs:
     json: bool = False
     """Print JSON and nothing else."""
     out: Path | None = None
-    """File to write the JSON to as well, after each peer."""
+    """File to write the JSON to as well, after each trial."""
 
 
 @dataclass
@@ -112,12 +112,15 @@ class PeerWalk:
         return dataclasses.asdict(self) | {name: getattr(last, name, None) for name in names}
 
 
-def train_until_walking(peer: Peer, args: PeerWalksArgs) -> PeerWalk:
+def train_until_walking(
+    peer: Peer, args: PeerWalksArgs, keep: Callable[[PeerWalk], None] = lambda _walk: None
+) -> PeerWalk:
     """Train a peer until its policy walks, or its minutes are over.
 
     Args:
         peer: The peer, which has not trained yet.
         args: How long, and what a trial is.
+        keep: Given what is known after each trial.
     """
     about = peer.rate
     walk = PeerWalk(
@@ -143,6 +146,7 @@ def train_until_walking(peer: Peer, args: PeerWalksArgs) -> PeerWalk:
             break
         figures = (answer["velocity_error_sq"], answer["fall_rate"])
         walk.trials.append(Trial(minutes, steps, *figures, walks(*figures)))
+        keep(walk)
         if walk.trials[-1].walks or minutes >= args.minutes:
             break
     return walk
@@ -177,13 +181,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     }
     for name in names:
         told.print(f"{name} since {time.strftime('%H:%M')}")
+        before = content["peers"]
+
+        def keep(walk: PeerWalk, before: list[dict[str, Any]] = before) -> None:
+            content["peers"] = [*before, walk.as_row()]
+            if args.out is not None:
+                write_json(args.out, content)
+
         peer = Peer(name, pythons[name], args.num_envs, DEFAULT_TASK)
         try:
-            content["peers"].append(train_until_walking(peer, args).as_row())
+            keep(train_until_walking(peer, args, keep))
         finally:
             peer.close()
-        if args.out is not None:
-            write_json(args.out, content)
     if args.json:
         print(json.dumps(without_nan(content)))
     elif names:

@@ -19,7 +19,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -175,7 +175,11 @@ class Peer:
         except OSError as error:
             self.fault = f"{python} does not start: {error.strerror}"
             return
-        self._take_facts(self._answer())
+        try:
+            self._take_facts(self._answer())
+        except BaseException:  # as Ctrl-C while it starts, which may take minutes
+            self.close(grace=0.0)
+            raise
 
     def ask(self, request: str) -> dict[str, Any]:
         """Return the answer to a request, `{"error": WHY}` if it cannot be met."""
@@ -186,15 +190,19 @@ class Peer:
             return self._answer()
         return {"error": self.fault}
 
-    def close(self) -> None:
-        """End it."""
+    def close(self, grace: float = _GRACE) -> None:
+        """End it.
+
+        Args:
+            grace: How long it may take to end by itself, s.
+        """
         if self._process is not None:
             for pipe in (self._process.stdin, self._process.stdout):
                 if pipe is not None:
                     with contextlib.suppress(OSError):
                         pipe.close()
             try:
-                self._process.wait(_GRACE)
+                self._process.wait(grace)
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
@@ -238,6 +246,7 @@ def time_peers(
     task: str,
     begin: Callable[[str], None] = lambda _told: None,
     device: str = "cpu",
+    after_round: Callable[[Sequence[PeerRate]], None] = lambda _rates: None,
 ) -> list[PeerRate]:
     """Time MUTE and peers in turns; one that cannot run says so in its note.
 
@@ -249,26 +258,28 @@ def time_peers(
         task: Name of the task of MUTE and Gymnasium.
         begin: Told what begins.
         device: Where they run, as for a `Peer`.
+        after_round: Given what is known after each round, when all of them wait.
     """
     peers: list[Peer] = []
     try:
         for name in (ITSELF, *names):
             begin(f"{name} starts")
             peers.append(Peer(name, pythons[name], num_envs, task, device))
-        rates = {part: _rounds(peers, part, rounds, begin) for part in _PARTS}
+        for part in _PARTS:
+            for rates in _rounds(peers, part, rounds, begin):
+                for peer in peers:
+                    _sum_up(peer, part, rates[peer.rate.name], rates[ITSELF])
+                after_round([peer.rate for peer in peers])
     finally:
         for peer in peers:
             peer.close()
-    for peer in peers:
-        for part in _PARTS:
-            _sum_up(peer, part, rates[part][peer.rate.name], rates[part][ITSELF])
     return [peer.rate for peer in peers]
 
 
 def _rounds(
     peers: Sequence[Peer], part: str, rounds: int, begin: Callable[[str], None]
-) -> dict[str, list[float]]:
-    """Return by peer how many control steps a second each round made of a part."""
+) -> Iterator[Mapping[str, Sequence[float]]]:
+    """Yield by peer how many control steps a second the rounds of a part made, after each."""
     rates: dict[str, list[float]] = {peer.rate.name: [] for peer in peers}
     left = list(peers)
     for round_number in range(rounds + 1):
@@ -283,7 +294,7 @@ def _rounds(
                 left.remove(peer)
             elif round_number > 0:  # the first one compiles, and finds its memory
                 rates[peer.rate.name].append(answer["steps"] / answer["seconds"])
-    return rates
+        yield rates
 
 
 def _note(peer: Peer, part: str, error: str) -> None:

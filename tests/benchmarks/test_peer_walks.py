@@ -70,6 +70,25 @@ def test_a_peer_that_fails_keeps_its_trials_and_says_why():
     assert (row["minutes"], row["walks"], row["note"]) == (2.0, False, "no memory")
 
 
+def test_every_trial_is_in_the_file_before_the_next_begins(tmp_path, monkeypatch):
+    out = tmp_path / "walks.json"
+    peer = _Peer([60.0] * 9, [(0.5, 0.1), (0.3, 0.2)])
+    ask = peer.ask
+
+    def interrupted(request: str) -> object:
+        if peer.asked.count("walk 128 10.0") == 2:
+            raise KeyboardInterrupt
+        return ask(request)
+
+    peer.ask = interrupted
+    monkeypatch.setattr(peer_walks, "Peer", lambda *_: peer)
+    argv = ["--peers", "mjlab", "--every", "1", "--out", str(out), "--json"]
+    with pytest.raises(KeyboardInterrupt):
+        peer_walks.main(argv)
+    (row,) = json.loads(out.read_text())["peers"]
+    assert [trial["velocity_error_sq"] for trial in row["trials"]] == [0.5, 0.3]
+
+
 def test_a_peer_that_does_not_start_is_told_and_the_others_go_on(tmp_path, capsys):
     out = tmp_path / "walks.json"
     argv = ["--peers", "mjlab,unilab", "--peers-from", str(tmp_path), "--json", "--out", str(out)]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import fcntl
 import sys
-import textwrap
 import venv
 from pathlib import Path
 
 import numpy as np
 import pytest
+from peer_programs import peer_python
 from peers.walking import WalkMeter
 
 from mute.command_lines.benchmark_peers import (
@@ -22,38 +23,6 @@ from mute.command_lines.benchmark_peers import (
 )
 from mute.tasks import DEFAULT_TASK
 
-FACTS = {
-    **{"version": "1.0", "engine": "an engine 2.0", "robot": "a robot", "task": "a task"},
-    **{"num_envs": 8, "physics_step": 0.005, "decimation": 4, "note": "a note"},
-}
-
-
-def _python(folder: Path, name: str, answers: str, facts: object = FACTS) -> Path:
-    """Write an interpreter that answers as a peer does, and notes what it is asked.
-
-    Args:
-        folder: Where it and `asked`, common to all there, are written.
-        name: Its name.
-        answers: Expression of the answer, of `part` and `number`, the requests until then.
-        facts: What it says first.
-    """
-    program = f"""\
-        #!{sys.executable}
-        import json, sys
-        print(json.dumps({facts!r}), flush=True)
-        counts = dict()
-        for line in sys.stdin:
-            part = line.split()[0]
-            number = counts[part] = counts.get(part, 0) + 1
-            with open({str(folder / "asked")!r}, "a") as asked:
-                asked.write({name!r} + " " + line)
-            print(json.dumps({answers}), flush=True)
-    """
-    path = folder / name
-    path.write_text(textwrap.dedent(program))
-    path.chmod(0o755)
-    return path
-
 
 def _time(name: str, python: Path, own: Path, rounds: int = 1) -> PeerRate:
     return time_peers([name], {ITSELF: own, name: python}, 8, rounds, DEFAULT_TASK)[1]
@@ -62,7 +31,7 @@ def _time(name: str, python: Path, own: Path, rounds: int = 1) -> PeerRate:
 @pytest.fixture
 def own(tmp_path):
     """Return an interpreter that stands in for MUTE, and makes 100 control steps a second."""
-    return _python(tmp_path, ITSELF, "dict(steps=100, seconds=1.0)")
+    return peer_python(tmp_path, ITSELF, "dict(steps=100, seconds=1.0)")
 
 
 def test_all_stands_for_every_peer_and_nothing_for_none():
@@ -85,7 +54,7 @@ def test_a_folder_has_each_peer_by_its_name_and_one_that_is_named_counts_before_
 def test_mute_and_peers_are_asked_in_turns_back_and_forth(tmp_path, own):
     answers = "dict(steps=100, seconds=1.0)"
     pythons = {ITSELF: own} | {
-        name: _python(tmp_path, name, answers) for name in ("mjlab", "unilab")
+        name: peer_python(tmp_path, name, answers) for name in ("mjlab", "unilab")
     }
     time_peers(["mjlab", "unilab"], pythons, 8, 1, DEFAULT_TASK)
     asked = (tmp_path / "asked").read_text().splitlines()
@@ -97,7 +66,7 @@ def test_mute_and_peers_are_asked_in_turns_back_and_forth(tmp_path, own):
 
 def test_rates_are_medians_of_all_rounds_but_the_first(tmp_path, own):
     # Rounds of 10 (which compiles), 400, 100 and 200 control steps a second.
-    python = _python(
+    python = peer_python(
         tmp_path,
         "mjlab",
         "dict(steps=[10, 800, 200, 400][number - 1], seconds=[1.0, 2.0][number > 1])",
@@ -112,7 +81,7 @@ def test_rates_are_medians_of_all_rounds_but_the_first(tmp_path, own):
 
 
 def test_of_enough_rounds_the_interval_of_the_median_is_told(tmp_path, own):
-    python = _python(tmp_path, "mjlab", "dict(steps=100 * number, seconds=1.0)")
+    python = peer_python(tmp_path, "mjlab", "dict(steps=100 * number, seconds=1.0)")
     rate = _time("mjlab", python, own, rounds=6)
     # With six values it is from the smallest to the largest: 1/32 lies outside.
     assert (rate.environment, rate.intervals["environment"]) == (450.0, [200.0, 700.0])
@@ -120,19 +89,19 @@ def test_of_enough_rounds_the_interval_of_the_median_is_told(tmp_path, own):
 
 def test_a_peer_without_a_learner_has_no_rate_of_a_loop_and_no_fault(tmp_path, own):
     answers = "dict(absent=part) if part == 'loop' else dict(steps=8, seconds=1.0)"
-    rate = _time("gymnasium", _python(tmp_path, "gymnasium", answers), own)
+    rate = _time("gymnasium", peer_python(tmp_path, "gymnasium", answers), own)
     assert (rate.environment, rate.loop, rate.note) == (8.0, None, "a note")
 
 
 def test_a_part_that_fails_is_told_and_the_other_one_is_timed(tmp_path, own):
     answers = "dict(error='no memory') if part == 'loop' else dict(steps=8, seconds=1.0)"
-    rate = _time("mjlab", _python(tmp_path, "mjlab", answers), own)
+    rate = _time("mjlab", peer_python(tmp_path, "mjlab", answers), own)
     assert (rate.environment, rate.loop, rate.note) == (8.0, None, "a note; loop: no memory")
 
 
 def test_a_peer_that_dies_is_told_once_and_keeps_what_it_had(tmp_path, own):
     answers = "dict(steps=8, seconds=1.0) if part == 'environment' else sys.exit('out of memory')"
-    rate = _time("mjlab", _python(tmp_path, "mjlab", answers), own, rounds=2)
+    rate = _time("mjlab", peer_python(tmp_path, "mjlab", answers), own, rounds=2)
     assert rate.environment == 8.0
     assert rate.note == "a note; failed with status 1: out of memory"
 
@@ -147,6 +116,48 @@ def test_a_peer_whose_package_is_missing_says_so(tmp_path, own, name, package):
     assert _time(name, python, own) == PeerRate(
         name, note=f"{package} is not installed for {python}"
     )
+
+
+def test_an_interrupt_while_a_peer_starts_leaves_nothing_running(tmp_path, monkeypatch):
+    held = tmp_path / "held"
+    python = tmp_path / "python"
+    python.write_text(
+        f"#!{sys.executable}\n"
+        "import fcntl, signal\n"
+        f"held = open({str(held)!r}, 'w')\n"
+        "fcntl.flock(held, fcntl.LOCK_EX)\n"
+        "print('never an answer, but a sign that it holds the file', flush=True)\n"
+        "signal.pause()\n"
+    )
+    python.chmod(0o755)
+    read = Peer._answer
+
+    def interrupted(peer: Peer) -> dict:
+        read(peer)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Peer, "_answer", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        time_peers(["mjlab"], {ITSELF: python}, 8, 1, DEFAULT_TASK)
+    with held.open("r+") as free:
+        fcntl.flock(free, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def test_what_is_known_is_told_after_every_round(tmp_path, own):
+    told: list[tuple[float | None, float | None, int]] = []
+
+    def after_round(rates) -> None:
+        mjlab = rates[1]
+        told.append((mjlab.environment, mjlab.loop, sum(mjlab.rounds.values())))
+
+    python = peer_python(tmp_path, "mjlab", "dict(steps=100 * number, seconds=1.0)")
+    pythons = {ITSELF: own, "mjlab": python}
+    time_peers(["mjlab"], pythons, 8, 2, DEFAULT_TASK, after_round=after_round)
+    # The first round of each part does not count.
+    assert told == [
+        (None, None, 0), (200.0, None, 1), (250.0, None, 2),
+        (250.0, None, 2), (250.0, 200.0, 3), (250.0, 250.0, 4),
+    ]  # fmt: skip
 
 
 def test_an_interpreter_that_is_not_there_is_told(own):
