@@ -2,8 +2,9 @@
 
 Each part is a program of its own with a time limit of its own: one that fails or takes too long
 leaves its message in the file, and the next one begins. The file is written anew after every part,
-so that what was measured is kept whatever happens. `--dry-run-on-cpu` runs the same parts as small
-as can be on the CPU, to see that they work; its figures mean nothing.
+so that what was measured is kept whatever happens. A signal that asks it to end ends the part under
+way, with all that it started, and is told in the file. `--dry-run-on-cpu` runs the same parts as
+small as can be on the CPU, to see that they work; its figures mean nothing.
 
 It imports nothing but the standard library, so that it has a word to say where nothing works.
 """
@@ -13,24 +14,28 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import math
 import os
-import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Part", "main", "run_part"]
+from .gpu_memory import nvidia_smi
+
+__all__ = ["Part", "Stop", "main", "run_part"]
 
 _REPOSITORY = Path(__file__).resolve().parents[1]
 
 _POLL = 0.5
-"""How often the GPU's memory is read, s."""
+"""How often a part is looked after at least, s."""
+
+_ASKS_TO_END = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 _VERSIONS = ("torch", "mujoco", "mujoco-warp", "warp-lang", "rsl-rl-lib")
 
@@ -52,26 +57,78 @@ class Part:
     """Reads its result from what it printed."""
 
 
+@dataclass
+class Stop:
+    """Whether a signal has asked this process to end, and which."""
+
+    asked: signal.Signals | None = None
+    """The first such signal."""
+
+    @contextlib.contextmanager
+    def listening(self) -> Iterator[None]:
+        """Take note of signals that would end this process; those that are ignored stay so.
+
+        Nothing is raised, for what is raised between a part's start and the line that notes it
+        would leave the part behind.
+        """
+        before = {number: signal.getsignal(number) for number in _ASKS_TO_END}
+        heard = [number for number, action in before.items() if action != signal.SIG_IGN]
+        for number in heard:
+            signal.signal(number, self._note)
+        try:
+            yield
+        finally:
+            for number in heard:
+                signal.signal(number, before[number])
+
+    def _note(self, number: int, _frame: object) -> None:
+        self.asked = self.asked or signal.Signals(number)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status: 1 if a part has no result."""
     args = _arguments(argv)
+    stop = Stop()
+    try:
+        with stop.listening():
+            outcomes = _measure(args, stop)
+    except OSError as error:
+        print(f"error: {error.filename or args.out}: {error.strerror}", file=sys.stderr)
+        return 2
+    if stop.asked is not None:
+        print(f"error: stopped by {stop.asked.name}; written: {args.out}", file=sys.stderr)
+        return 128 + stop.asked
+    print(f"written: {args.out}")
+    return int(any(outcome["status"] != "done" for outcome in outcomes.values()))
+
+
+def _measure(args: argparse.Namespace, stop: Stop) -> Mapping[str, Mapping[str, Any]]:
+    """Run the parts, write the file after each, and return what came of them by name.
+
+    Raises:
+        OSError: If the file cannot be written.
+    """
     end = time.monotonic() + args.seconds
     with tempfile.TemporaryDirectory() as folder:
         content: dict[str, Any] = {
             "rehearsal_on_cpu": args.dry_run_on_cpu,
+            "stopped": None,
             "machine": _machine(),
             "parts": {},
         }
         _write(args.out, content)
         for part in _parts(args, Path(folder)):
+            if stop.asked is not None:
+                break
             left = end - time.monotonic()
-            print(f"{part.name}: at most {min(part.limit, left):.0f} s", flush=True)
-            outcome = run_part(part, left)
+            print(f"{part.name}: at most {max(0.0, min(part.limit, left)):.0f} s", flush=True)
+            outcome = run_part(part, left, stop)
             content["parts"][part.name] = outcome
             _write(args.out, content)
             print(f"{part.name}: {outcome['status']} {outcome['message']}".strip(), flush=True)
-    print(f"written: {args.out}")
-    return int(any(outcome["status"] != "done" for outcome in content["parts"].values()))
+        if stop.asked is not None:
+            _write(args.out, content | {"stopped": stop.asked.name})
+    return content["parts"]
 
 
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
@@ -97,7 +154,7 @@ def _parts(args: argparse.Namespace, folder: Path) -> list[Part]:
     runs = folder / "runs"
     engines = ["--num-envs", "8", "--steps", "10"] if tiny else []
     training = [
-        *(python, str(_REPOSITORY / "train.py"), "--task", "go1_mute", "--device", device),
+        *(python, "-m", "benchmarks.gpu_training", "--task", "go1_mute", "--device", device),
         *("--num-envs", str(robots), "--iterations", str(iterations), "--plain"),
         *("--log-dir", str(runs), "--run-name", "gpu"),
     ]
@@ -117,18 +174,25 @@ def _parts(args: argparse.Namespace, folder: Path) -> list[Part]:
             150.0,
             _last_line,
         ),
-        Part("training", tuple(training), 170.0, lambda _said: _curves(runs, robots, iterations)),
+        Part(
+            "training",
+            tuple(training),
+            170.0,
+            lambda said: _curves(runs, robots, iterations) | _memory(said),
+        ),
         *(rates(number) for number in ((8, 16) if tiny else (4096, 16384))),
     ]
 
 
-def run_part(part: Part, left: float) -> dict[str, Any]:
+def run_part(part: Part, left: float, stop: Stop | None = None) -> dict[str, Any]:
     """Run a part and return what came of it.
 
     Args:
         part: The part.
         left: Time until everything must be over, s.
+        stop: What may ask to end the part; None for nothing.
     """
+    stop = stop or Stop()
     start = time.monotonic()
     limit = min(part.limit, left)
     if limit <= 0.0:
@@ -142,15 +206,17 @@ def run_part(part: Part, left: float) -> dict[str, Any]:
             )  # fmt: skip
         except OSError as error:
             return _outcome("failed", f"{part.command[0]}: {error.strerror}", 0.0, part.limit)
-        timed_out, gpu_memory = _wait(process, start + limit)
+        timed_out = _wait(process, start + limit, stop)
         seconds = time.monotonic() - start
         said.seek(0)
         errors.seek(0)
         text, complaint = said.read(), errors.read()
-    outcome = _outcome("done", "", seconds, part.limit) | {"peak_gpu_memory_mb": gpu_memory}
+    outcome = _outcome("done", "", seconds, part.limit)
     with contextlib.suppress(Exception):  # a part that fails may have a result nevertheless
         outcome["result"] = part.result(text)
-    if timed_out:
+    if stop.asked is not None:
+        outcome |= {"status": "stopped", "message": f"by {stop.asked.name}"}
+    elif timed_out:
         outcome |= {"status": "timed out", "message": f"ended after {seconds:.0f} s"}
     elif process.returncode != 0 or "result" not in outcome:
         lines = [line for line in complaint.splitlines() if line.strip()] or ["no message"]
@@ -168,53 +234,23 @@ def _paths() -> list[str]:
     return [str(_REPOSITORY), *filter(None, others.split(os.pathsep))]
 
 
-def _wait(process: subprocess.Popen[Any], end: float) -> tuple[bool, float | None]:
+def _wait(process: subprocess.Popen[Any], end: float, stop: Stop) -> bool:
     """Wait for a program, and end all that it started when its time is over.
 
     Returns:
-        Whether it was ended, and the most memory of the GPU that was in use, MB; None without one.
+        Whether its time was over.
     """
-    most: float | None = None
     timed_out = False
     try:
-        while process.poll() is None:
-            if time.monotonic() >= end:
-                timed_out = True
-                break
-            used = _gpu_memory()
-            most = used if most is None else max(most, used or 0.0)
+        while process.poll() is None and stop.asked is None and not timed_out:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(max(0.0, min(_POLL, end - time.monotonic())))
+            timed_out = process.poll() is None and time.monotonic() >= end
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)  # what it left behind, too
         process.wait()
-    return timed_out, most
-
-
-def _gpu_memory() -> float | None:
-    """Return how much memory of the first GPU is in use, MB."""
-    told = _nvidia_smi("memory.used")
-    try:
-        return float(told[0]) if told else None
-    except ValueError:
-        return None
-
-
-def _nvidia_smi(fields: str) -> list[str]:
-    """Return what the driver tells of the first GPU; nothing without one."""
-    program = shutil.which("nvidia-smi")
-    if program is None:
-        return []
-    command = [program, f"--query-gpu={fields}", "--format=csv,noheader,nounits"]
-    try:
-        result = subprocess.run(command, capture_output=True, text=True, timeout=20.0)
-    except (OSError, subprocess.TimeoutExpired):
-        return []
-    lines = result.stdout.splitlines()
-    return (
-        [word.strip() for word in lines[0].split(",")] if result.returncode == 0 and lines else []
-    )
+    return timed_out
 
 
 def _machine() -> dict[str, Any]:
@@ -227,7 +263,7 @@ def _machine() -> dict[str, Any]:
             versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             versions[name] = None
-    gpu = _nvidia_smi("name,driver_version,memory.total")
+    gpu = nvidia_smi("name,driver_version,memory.total")
     named = dict(zip(("name", "driver", "memory_mb"), gpu, strict=False)) if gpu else None
     git = ["git", "-C", str(_REPOSITORY), "describe", "--always", "--dirty", "--abbrev=40"]
     try:
@@ -245,10 +281,15 @@ def _machine() -> dict[str, Any]:
 
 
 def _last_line(said: str) -> dict[str, Any]:
-    """Return the JSON object of the last line."""
-    content = json.loads(said.splitlines()[-1])
+    """Return the JSON object of the last line; a part that was ended may have left half a line.
+
+    Raises:
+        ValueError: If there is no such line.
+    """
+    whole = said[: said.rfind("\n") + 1].splitlines()
+    content = json.loads(whole[-1] if whole else "")
     if not isinstance(content, dict):
-        raise TypeError("no object")
+        raise ValueError("no object")
     return content
 
 
@@ -267,10 +308,27 @@ def _curves(runs: Path, num_envs: int, iterations: int) -> dict[str, Any]:
     }
 
 
-def _write(path: Path, content: Mapping[str, Any]) -> None:
+def _memory(said: str) -> dict[str, Any]:
+    """Return what a training says at its end; nothing of one that was cut short."""
+    try:
+        return _last_line(said)
+    except ValueError:
+        return {}
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    """Return plain data with None for numbers that are not finite: JSON has none."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, list) else value
+
+
+def _write(path: Path, content: dict[str, Any]) -> None:
     """Write the file, whole or not at all."""
     part = path.with_name(f"{path.name}.part")
-    part.write_text(json.dumps(content, indent=2) + "\n")
+    part.write_text(json.dumps(_plain(content), indent=2, allow_nan=False) + "\n")
     part.replace(path)
 
 

@@ -1,7 +1,7 @@
 """Time MUTE and mjlab in turns on one device: python -m benchmarks.gpu_rates --num-envs 4096.
 
 Environments alone and whole training loops, as `mute.benchmark --peers` times them on the CPU.
-Prints one JSON object.
+Prints a JSON object after each round, a line each, with all that is known until then.
 """
 
 from __future__ import annotations
@@ -11,12 +11,16 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mute.command_lines.arguments import check_option, command_line, parse
-from mute.command_lines.benchmark_peers import ITSELF, peer_pythons, time_peers
+from mute.command_lines.benchmark_peers import ITSELF, PeerRate, peer_pythons, time_peers
 from mute.support.errors import run_cli
+from mute.support.plain_data import without_nan
 from mute.support.ranges import Range
 from mute.tasks import DEFAULT_TASK
+
+from .gpu_memory import memory_in_use
 
 __all__ = ["GpuRatesArgs", "main"]
 
@@ -47,12 +51,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     check_option("rounds", args.rounds, Range(1, 10**6, whole=True))
     names = ["mjlab"] if args.peers_from is not None else []
     pythons = peer_pythons(names, args.peers_from, {})
-    rates = time_peers(names, pythons, args.num_envs, args.rounds, DEFAULT_TASK, device=args.device)
-    content = {rate.name: dataclasses.asdict(rate) for rate in rates}
-    if not names:
-        content["mjlab"] = {"note": "not timed: no --peers-from with its environment was given"}
-    print(json.dumps(content))
-    return int(content[ITSELF]["loop"] is None)
+    peak: float | None = None
+
+    def after_round(rates: Sequence[PeerRate]) -> None:
+        nonlocal peak
+        used = memory_in_use() if args.device != "cpu" else None  # nothing is timed now
+        if used is not None:
+            peak = max(used, peak or 0.0)
+        content: dict[str, Any] = {rate.name: dataclasses.asdict(rate) for rate in rates}
+        if not names:
+            content["mjlab"] = {"note": "not timed: no --peers-from with its environment was given"}
+        content["peak_gpu_memory_mb"] = peak
+        print(json.dumps(without_nan(content)), flush=True)
+
+    rates = time_peers(
+        names, pythons, args.num_envs, args.rounds, DEFAULT_TASK, device=args.device,
+        after_round=after_round,
+    )  # fmt: skip
+    return int(next(rate for rate in rates if rate.name == ITSELF).loop is None)
 
 
 if __name__ == "__main__":

@@ -1,164 +1,126 @@
-"""Tests of what measures MUTE on a GPU, as far as a CPU can show it."""
+"""Tests of the script that measures MUTE on a GPU: what it refuses, and what it starts."""
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import subprocess
-import sys
+from pathlib import Path
 
 import pytest
 from places import REPOSITORY
 
-from benchmarks import gpu
-from benchmarks.gpu import Part, run_part
-
 _SCRIPT = REPOSITORY / "benchmarks" / "gpu.sh"
 
 
-def _part(source: str, limit: float = 60.0) -> Part:
-    return Part("a part", (sys.executable, "-c", source), limit, json.loads)
+def _program(path: Path, script: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"#!/bin/sh\n{script}\n")
+    path.chmod(0o755)
+    return path
 
 
-def _said(source: str, limit: float = 60.0) -> dict:
-    outcome = run_part(_part(source, limit), 60.0)
-    return {name: outcome.get(name) for name in ("status", "message", "result")}
+def _run(*options: str | Path, **settings: Path | str) -> subprocess.CompletedProcess[str]:
+    """Run the script in `cwd`, with `path` before all other folders of programs."""
+    variables = dict(os.environ)
+    if "path" in settings:
+        variables["PATH"] = f"{settings['path']}{os.pathsep}{os.environ['PATH']}"
+    command = ["bash", str(_SCRIPT), *map(str, options)]
+    cwd = settings.get("cwd", REPOSITORY)
+    return subprocess.run(command, capture_output=True, text=True, env=variables, cwd=cwd)
 
 
-@pytest.fixture(scope="module")
-def rehearsal(tmp_path_factory):
-    """Return what the script writes in its rehearsal, with a folder that has no mjlab."""
-    folder = tmp_path_factory.mktemp("gpu")
-    out = folder / "gpu.json"
-    options = ["--python", sys.executable, "--out", str(out), "--peers-from", str(folder)]
-    command = ["bash", str(_SCRIPT), *options, "--dry-run-on-cpu"]
-    result = subprocess.run(command, capture_output=True, text=True)
-    assert result.returncode == 0, result.stdout + result.stderr
-    return json.loads(out.read_text())
+def _refused(result: subprocess.CompletedProcess[str], told: str) -> bool:
+    """Tell whether it ended with status 2 and one line that begins as given."""
+    one = result.stderr.count("\n") == 1
+    return result.returncode == 2 and one and result.stderr.startswith(f"error: {told}")
 
 
-def test_the_rehearsal_runs_every_part(rehearsal):
-    assert rehearsal["rehearsal_on_cpu"]
-    assert {name: part["status"] for name, part in rehearsal["parts"].items()} == dict.fromkeys(
-        ("engines", "training", "rates_8", "rates_16"), "done"
-    )
-    assert all(part["limit_seconds"] >= 60.0 for part in rehearsal["parts"].values())
-    assert rehearsal["machine"]["versions"]["mujoco"]
-
-
-def test_the_rehearsal_holds_the_engines_to_each_other(rehearsal):
-    engines = rehearsal["parts"]["engines"]["result"]
-    assert (engines["device"], engines["num_envs"], engines["steps"]) == ("cpu", 8, 10)
-    assert engines["within_tolerances"]
-    assert engines["agreed"] >= engines["least_agreed"] > 0.0
-    for name, tolerance in engines["tolerances"].items():
-        # Engines in different precision never agree to the last bit.
-        assert 0.0 < engines["differences"][name] <= tolerance
-
-
-def test_the_rehearsal_trains_and_tells_speed_and_reward(rehearsal):
-    training = rehearsal["parts"]["training"]["result"]
-    assert (training["iterations"], training["num_envs"]) == (2, 16)
-    assert training["steps_per_second"] > 0.0
-    assert isinstance(training["mean_reward"], float)
-
-
-def test_the_rehearsal_times_loops_and_says_that_mjlab_is_not_there(rehearsal):
-    for number in (8, 16):
-        rates = rehearsal["parts"][f"rates_{number}"]["result"]
-        assert rates["mute"]["num_envs"] == number
-        assert min(rates["mute"]["environment"], rates["mute"]["loop"]) > 0.0
-        assert "does not start: No such file" in rates["mjlab"]["note"]
-
-
-def test_a_part_that_fails_leaves_the_last_line_of_what_it_said():
-    assert _said("raise SystemExit('CUDA out of memory')") == {
-        "status": "failed",
-        "message": "status 1: CUDA out of memory",
-        "result": None,
-    }
-
-
-def test_a_part_that_prints_no_result_has_failed():
-    assert _said("print('no figures')")["status"] == "failed"
-
-
-def test_a_part_that_fails_keeps_the_result_that_it_had():
-    said = _said("print('{\"worst\": 2.0}'); raise SystemExit(1)")
-    assert (said["status"], said["result"]) == ("failed", {"worst": 2.0})
-
-
-def test_a_part_that_takes_too_long_is_ended_with_all_that_it_started(tmp_path):
-    held = tmp_path / "held"
-    child = (
-        "import fcntl, signal\n"
-        f"held = open({str(held)!r}, 'w')\n"
-        "fcntl.flock(held, fcntl.LOCK_EX)\n"
-        "signal.pause()"
-    )
-    source = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
-    said = _said(source, limit=3.0)
-    assert (said["status"], said["message"]) == ("timed out", "ended after 3 s")
-    with held.open("w") as free:
-        fcntl.flock(free, fcntl.LOCK_EX)  # it would wait for ever for a child that goes on
-
-
-def test_a_part_for_which_no_time_is_left_is_not_begun():
-    outcome = run_part(_part("print('{}')"), left=0.0)
-    assert (outcome["status"], outcome["message"]) == ("not begun", "no time was left")
-
-
-def test_a_part_that_fails_does_not_keep_others_from_running(tmp_path, monkeypatch, capsys):
-    parts = [_part("raise SystemExit('broken')"), _part("print('{\"rate\": 1.0}')")]
-    named = [
-        Part(name, part.command, 60.0, json.loads) for name, part in zip("ab", parts, strict=True)
+def test_what_is_asked_for_is_handed_on_with_whole_paths_from_the_checkout(tmp_path):
+    python = _program(tmp_path / "python", 'echo "$0"\npwd\nprintf "%s\\n" "$@"')
+    link = tmp_path / "environment" / "python"
+    link.parent.mkdir()
+    link.symlink_to(python)
+    options = ["--python", "environment/python", "--out", "gpu.json", "--peers-from", "peers"]
+    result = _run(*options, "--dry-run-on-cpu", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    called, folder, *words = result.stdout.splitlines()
+    # The link stays: an interpreter finds its packages by the path that it is called by.
+    assert (Path(called), Path(folder)) == (link, REPOSITORY)
+    left = words.pop(words.index("--seconds") + 1)
+    assert 500 <= int(left) <= 600
+    assert words == [
+        *("-m", "benchmarks.gpu", "--out", str(tmp_path / "gpu.json"), "--seconds"),
+        *("--peers-from", str(tmp_path / "peers"), "--dry-run-on-cpu"),
     ]
-    monkeypatch.setattr(gpu, "_parts", lambda *_: named)
+
+
+def test_figures_of_another_time_are_removed_first(tmp_path):
     out = tmp_path / "gpu.json"
-    assert gpu.main(["--out", str(out), "--dry-run-on-cpu"]) == 1
-    content = json.loads(out.read_text())["parts"]
-    assert [content[name]["status"] for name in "ab"] == ["failed", "done"]
-    assert content["b"]["result"] == {"rate": 1.0}
-    assert "a: failed status 1: broken" in capsys.readouterr().out
-
-
-def test_on_a_gpu_the_parts_are_those_that_were_asked_for_and_fit_in_ten_minutes(tmp_path):
-    parts = {part.name: part for part in gpu._parts(gpu._arguments([]), tmp_path)}
-    assert list(parts) == ["engines", "training", "rates_4096", "rates_16384"]
-    assert sum(part.limit for part in parts.values()) <= 600.0
-    training = " ".join(parts["training"].command)
-    assert "--task go1_mute --device cuda --num-envs 4096 --iterations 60" in training
+    out.write_text("old")
+    result = _run("--python", _program(tmp_path / "python", "exit 3"), "--out", out)
+    assert (result.returncode, out.exists()) == (3, False)
 
 
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (["--fast"], "error: unknown option --fast; "),
-        (["--out"], "error: --out needs a value"),
+        (["--fast"], "unknown option --fast; "),
+        (["--out"], "--out needs a value"),
+        (["--out", "/nowhere/gpu.json"], "--out: there is no folder /nowhere"),
+        (["--out", "/"], "--out: / is a folder"),
+        (["--python", "/nowhere/python"], "--python: /nowhere/python is no program that can be"),
+        (["--python", str(_SCRIPT.parent)], f"--python: {_SCRIPT.parent} is no program that can"),
     ],
 )
-def test_the_script_refuses_what_it_does_not_know_in_one_line(options, told):
-    result = subprocess.run(["bash", str(_SCRIPT), *options], capture_output=True, text=True)
-    assert result.returncode == 2
-    assert result.stderr.startswith(told)
-    assert result.stderr.count("\n") == 1
+def test_bad_options_are_refused_in_one_line(options, told):
+    assert _refused(_run(*options), told)
 
 
 def test_where_packages_cannot_be_installed_the_file_says_so(tmp_path):
-    wheels = tmp_path / "wheels"
-    wheels.mkdir()
     out = tmp_path / "gpu.json"
-    python = tmp_path / "venv" / "bin" / "python"
-    python.parent.mkdir(parents=True)
-    python.write_text("#!/bin/sh\nexit 1\n")  # neither has MUTE nor can install it
-    python.chmod(0o755)
-    options = ["--out", str(out), "--wheels", str(wheels), "--venv", str(tmp_path / "venv")]
-    (tmp_path / "python3.11").symlink_to(python)
-    variables = os.environ | {"PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
-    command = ["bash", str(_SCRIPT), *options]
-    result = subprocess.run(command, capture_output=True, text=True, env=variables)
-    assert result.returncode == 2
+    # It neither has MUTE nor can install it.
+    _program(tmp_path / "venv" / "bin" / "python", "exit 1")
+    options = ["--out", out, "--wheels", tmp_path, "--venv", tmp_path / "venv"]
+    # The Python that is found is this one, whatever else the machine has.
+    _program(tmp_path / "bin" / "python3.11", "exit 0")
+    result = _run(*options, path=tmp_path / "bin")
     reason = "the packages cannot be installed, or not in 300 s"
+    assert _refused(result, f"{reason}\n")
     assert json.loads(out.read_text()) == {"error": reason}
-    assert result.stderr == f"error: {reason}\n"
+
+
+_WITHOUT_PIP = """
+case "$1 $2" in
+"-c "*) exit 0 ;;
+"-m venv") mkdir -p "$3/bin"; cp "$0" "$3/bin/python"; echo a long story; exit 1 ;;
+*) exit 1 ;;
+esac
+"""
+
+
+def test_an_environment_without_pip_is_told_in_one_line_and_removed(tmp_path):
+    python = _program(tmp_path / "bin" / "python3.11", _WITHOUT_PIP)
+    venv, out = tmp_path / "venv", tmp_path / "gpu.json"
+    result = _run("--out", out, "--venv", venv, path=python.parent)
+    assert _refused(result, "no virtual environment with pip can be made")
+    assert "python3-venv" in json.loads(out.read_text())["error"]
+    assert not venv.exists()
+
+
+@pytest.mark.parametrize("name", ["python3.12", "python3.13", "python3"])
+def test_every_python_that_is_new_enough_is_found(tmp_path, name):
+    for other in ("python3.11", "python3.12", "python3.13", "python3"):
+        _program(tmp_path / "bin" / other, "exit 1")  # too old
+    python = _program(tmp_path / "bin" / name, _WITHOUT_PIP)
+    result = _run("--out", tmp_path / "a", "--venv", tmp_path / "venv", path=python.parent)
+    assert f"can be made by {python};" in result.stderr
+
+
+def test_where_no_python_is_new_enough_the_file_says_so(tmp_path):
+    for name in ("python3.11", "python3.12", "python3.13", "python3"):
+        _program(tmp_path / "bin" / name, "exit 1")
+    out = tmp_path / "gpu.json"
+    result = _run("--out", out, "--venv", tmp_path / "venv", path=tmp_path / "bin")
+    assert _refused(result, "Python 3.11, 3.12 or 3.13 is not there")
+    assert json.loads(out.read_text()) == {"error": "Python 3.11, 3.12 or 3.13 is not there"}
