@@ -43,11 +43,16 @@ def read_seeds(folder: Path) -> dict[int, SeedFiles]:
     """Return by seed what is in `seedN.json` and `seedN_progress.json`, in the seeds' order.
 
     Raises:
-        MuteError: If a file is not what the command wrote.
+        MuteError: If a file is not what the command wrote, or of a training with another seed.
     """
     found = ((re.fullmatch(r"seed(\d+)\.json", path.name), path) for path in folder.glob("*.json"))
     paths = {int(match[1]): path for match, path in found if match}
-    return {seed: _read(paths[seed]) for seed in sorted(paths)}
+    files = {seed: _read(paths[seed]) for seed in sorted(paths)}
+    for seed, each in files.items():
+        trained = each.reliability.get("trained_seed", seed)  # the first files do not tell
+        if trained != seed:
+            raise MuteError(f"{paths[seed]} is of a policy that was trained with seed {trained}")
+    return files
 
 
 def reliability_section(seeds: Mapping[int, SeedFiles]) -> str:
@@ -71,7 +76,8 @@ def reliability_section(seeds: Mapping[int, SeedFiles]) -> str:
         f"Over the seeds {names}, each `python train.py --task go1_mute`, then `python "
         f"evaluate.py reliability` with {' or '.join(map(str, sorted(robots)))} robots "
         "(`docs/reliability/`). Unlike elsewhere on this page, robots here have randomised physics "
-        "and noisy sensors, unless the figure says else. What each figure is, is in "
+        "and noisy sensors, unless the figure says else. What one "
+        "seed never reached has no mean: never. What each figure is, is in "
         "[commands.md](commands.md)."
     )
 
@@ -94,11 +100,14 @@ def _figure(run: SeedFiles, part: str, name: str) -> Mapping[str, Any] | None:
 
 
 def _walking(run: SeedFiles) -> Mapping[str, Any] | None:
-    """Return after how many steps a training walked; None where that is not known."""
+    """Return after how many steps a training walked, infinitely many if it never did.
+
+    None where that is not known.
+    """
     if run.progress is None:
         return None
     first = next((row for row in run.progress["checkpoints"] if row["walks"]), None)
-    steps = float("nan") if first is None else first["steps"] / 1e6
+    steps = math.inf if first is None else first["steps"] / 1e6
     return Figure("walks", "million steps until it walks", steps, "", _WALKS).as_dict()
 
 
@@ -116,10 +125,14 @@ def _row(figures: Sequence[Mapping[str, Any] | None]) -> dict[str, Any]:
     return {
         "part": first["part"],
         "name": first["name"],
-        **{name: shown(value, first["unit"]) for name, value in ends.items()},
+        **{name: _told(value, first["unit"]) for name, value in ends.items()},
         "target": first["target"],
         "met": f"{sum(figure['met'] for figure in measured)} of {len(figures)}",
     }
+
+
+def _told(value: float | None, unit: str) -> str:
+    return "never" if value == math.inf else shown(value, unit)
 
 
 def _missing(value: float | None) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Figure", "PartResult", "Target", "shown"]
+__all__ = ["Figure", "PartResult", "Target", "shown", "worst"]
 
 
 @dataclass(frozen=True)
@@ -78,6 +78,18 @@ class PartResult:
     """What is judged."""
     tables: Mapping[str, Sequence[Mapping[str, Any]]]
     """What the figures are made of, by name: rows of plain data."""
+
+
+def worst(values: Sequence[float], target: Target) -> float:
+    """Return the value that is furthest from meeting a target; NaN if any was not to be had.
+
+    Args:
+        values: One or more.
+        target: What each has to be: at least something, or else at most or below something.
+    """
+    if any(math.isnan(value) for value in values):
+        return math.nan
+    return min(values) if target.at_least is not None else max(values)
 
 
 def shown(value: float | None, unit: str) -> str:

@@ -31,7 +31,7 @@ from mute.evaluation.reliability.conditions import (
     walk,
     without_noise,
 )
-from mute.evaluation.reliability.figures import Figure, PartResult, Target
+from mute.evaluation.reliability.figures import Figure, PartResult, Target, worst
 
 __all__ = ["SETTLE_TIME", "Standing", "Stillness", "measure_stands", "stands_work"]
 
@@ -251,16 +251,13 @@ def _directions(robots: int, seed: int) -> torch.Tensor:
 def _figures(rows: Sequence[Standing]) -> list[Figure]:
     values = {name: [getattr(row, name) for row in rows] for name in Standing.__annotations__}
 
-    def worst(name: str, column: str, unit: str, target: Target) -> Figure:
-        own = values[column]
-        value = min(own) if target.at_least is not None else max(own)
-        if any(math.isnan(one) for one in own):
-            value = math.nan
+    def at_worst(name: str, column: str, unit: str, target: Target) -> Figure:
+        value = worst(values[column], target)
         return Figure("stands", f"{name}, at the worst beta", value, unit, target)
 
     return [
-        worst("robots whose feet are down and stay down", "feet_down", "share", _SHARE),
-        worst("joint speed without noise", "joint_speed", "rad/s", _JOINT_SPEED),
-        worst("level at the trunk", "level", "dBA", _LEVEL),
-        worst("robots still again 3 s after a push", "recovered", "share", _SHARE),
+        at_worst("robots whose feet are down and stay down", "feet_down", "share", _SHARE),
+        at_worst("joint speed without noise", "joint_speed", "rad/s", _JOINT_SPEED),
+        at_worst("level at the trunk", "level", "dBA", _LEVEL),
+        at_worst("robots still again 3 s after a push", "recovered", "share", _SHARE),
     ]

@@ -57,8 +57,28 @@ def test_the_steps_until_a_training_walks_are_read_from_its_progress(tmp_path):
         checkpoints += [{"steps": steps, "walks": True}] if steps else []
         write_json(tmp_path / f"seed{seed}_progress.json", {"checkpoints": checkpoints})
     assert _rows(tmp_path)[1] == (
-        "| walks | million steps until it walks | 3 | 2 | 4 | <= 3 | 1 of 3 |"
+        "| walks | million steps until it walks | never | 2 | never | <= 3 | 1 of 3 |"
     )
+
+
+def test_trainings_that_all_walk_have_the_mean_of_their_steps(tmp_path):
+    for seed, steps in enumerate((2_000_000, 4_000_000)):
+        _write(tmp_path, seed, _falls(0.0))
+        checkpoints = [{"steps": steps, "walks": True}]
+        write_json(tmp_path / f"seed{seed}_progress.json", {"checkpoints": checkpoints})
+    assert _rows(tmp_path)[1] == (
+        "| walks | million steps until it walks | 3 | 2 | 4 | <= 3 | 1 of 2 |"
+    )
+
+
+def test_a_file_of_a_training_with_another_seed_than_its_name_is_refused(tmp_path):
+    for trained in (3, 4):
+        content = {"robots": 64, "trained_seed": trained, "figures": [_falls(0.0).as_dict()]}
+        write_json(tmp_path / "seed3.json", content)
+        if trained == 3:
+            assert list(read_seeds(tmp_path)) == [3]
+    with pytest.raises(MuteError, match=r"seed3\.json is of a policy that was trained with seed 4"):
+        read_seeds(tmp_path)
 
 
 def test_seeds_stand_in_their_order_and_other_files_are_left_alone(tmp_path):

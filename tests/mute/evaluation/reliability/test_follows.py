@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 import torch
 from exam_helpers import make_random_policy
@@ -79,3 +81,13 @@ def test_what_is_judged_is_the_worst_ratio_over_the_speeds():
         (0.0, True),
         (0.125, False),
     ]
+
+
+def test_a_speed_at_which_no_robot_could_be_measured_is_not_met():
+    for missing in (0, 4, 9):  # Python's own min and max tell by where it stands
+        rows = [Following(beta, speed, 8, speed, 1.0) for beta in (0.0, 1.0) for speed in SPEEDS]
+        for row in (missing, 10 + missing):
+            rows[row] = Following(rows[row].beta, rows[row].command_speed, 8, math.nan, math.nan)
+        ratios = follows._figures(rows, {0.0: 0.0, 1.0: 0.0}, {0.0: 0.0, 1.0: 0.0})[:3]
+        assert all(math.isnan(figure.value) for figure in ratios)
+        assert not any(figure.met for figure in ratios)

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from mute.evaluation.reliability.figures import Figure, Target, shown
+from mute.evaluation.reliability.figures import Figure, Target, shown, worst
 
 
 @pytest.mark.parametrize(
@@ -21,6 +21,19 @@ from mute.evaluation.reliability.figures import Figure, Target, shown
 def test_a_target_is_met_up_to_its_bound_and_never_by_what_was_not_to_be_had(target, met, not_met):
     assert all(target.met(value) for value in met)
     assert not any(target.met(value) for value in not_met)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_the_worst_of_values_of_which_one_was_not_to_be_had_is_not_to_be_had(first):
+    values = [math.nan, 1.0, 2.0] if first else [1.0, 2.0, math.nan]
+    assert math.isnan(worst(values, Target(at_least=0.9)))
+    assert math.isnan(worst(values, Target(at_most=2.1)))
+
+
+def test_the_worst_value_is_the_least_of_what_is_to_be_large_and_the_most_of_what_is_not():
+    assert worst([1.0, 3.0, 2.0], Target(at_least=0.9)) == 1.0
+    assert worst([1.0, 3.0, 2.0], Target(at_most=0.9)) == 3.0
+    assert worst([1.0, 3.0, 2.0], Target(below=0.9)) == 3.0
 
 
 def test_a_figure_as_plain_data_has_its_target_in_words_and_its_verdict():
