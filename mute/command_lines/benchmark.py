@@ -1,11 +1,13 @@
 """Measure the speed of training, part by part: python -m mute.benchmark.
 
 A training is timed in a process of its own, and so are the engine and the environment in it, which
-do each rollout of the training again alone. Every figure is a median over turns with the interval
-that holds the true one, and turns go on until the intervals of the ratios are as narrow as asked
-for. `--against` names an environment with another version of MUTE: both take turns on the machine,
-which only so can be compared. What each part is stands in `benchmark_figures`, how turns are taken
-in `benchmark_turns`; `--until-walking` is `benchmark_walking`'s.
+do each rollout of the training again alone. Turns are taken in blocks, each with processes and a
+seed of its own. Every figure is a median over the blocks' medians with its 95 % interval, and
+blocks go on until the intervals of the ratios are as narrow as asked for; that they end just then
+makes these slightly optimistic. `--against` names an environment with another version of MUTE: both
+take turns on the machine, which only so can be compared. What each part is stands in
+`benchmark_figures`, how turns are taken in `benchmark_turns`; `--until-walking` is
+`benchmark_walking`'s.
 `--peers` times other ways to step a Go1 after that, see `mute.command_lines.benchmark_peers`.
 """
 
@@ -42,7 +44,7 @@ from mute.command_lines.arguments import (
 )
 from mute.command_lines.benchmark_figures import (
     CAPTIONS,
-    MIN_TURNS,
+    MIN_BLOCKS,
     PARTS,
     comparison,
     figures_of,
@@ -54,11 +56,12 @@ from mute.command_lines.benchmark_figures import (
 from mute.command_lines.benchmark_peers import PEER_COLUMNS, peer_names, peer_pythons, time_peers
 from mute.command_lines.benchmark_turns import (
     THIS,
-    Times,
+    Block,
     Version,
     Worker,
     other_version,
-    take_turns,
+    take_blocks,
+    times_of,
 )
 from mute.command_lines.benchmark_walking import time_to_walk
 from mute.evaluation.tables import print_table, write_json
@@ -79,14 +82,17 @@ class BenchmarkArgs:
     num_envs: tuple[int, ...] = (1024, 4096)
     """Numbers of environments."""
     precision: float = 0.03
-    """Turns go on until half the 95 % interval of each ratio's median is within this share of
-    it."""
-    max_turns: int = 100
+    """Blocks go on until half the 95 % interval of each ratio's median over blocks is within this
+    share of it. That is looked at after whole blocks, from the sixth on."""
+    block_turns: int = 3
+    """Turns of a block, after one that warms up; each block begins with fresh processes."""
+    max_turns: int = 60
     """The most turns of each number of environments; what is not precise by then is told so."""
     rollouts: int | None = None
     """Exactly so many turns, however precise; a turn is a rollout of every part."""
     seed: int = 0
-    """Seed of the order of the parts within a turn."""
+    """Seed of the order of the parts within a turn, and of the first block's trainings; that of
+    each further block is one more."""
     against: str | None = None
     """PYTHON[:CHECKOUT]: the interpreter of an environment with another version of MUTE to compare
     with in the same turns, and the top of that version's tree unless it is installed there."""
@@ -159,7 +165,9 @@ def _check(args: BenchmarkArgs) -> tuple[str, ...]:
     for num_envs in args.num_envs:
         check_option("num-envs", num_envs, Range(1, 2**20, whole=True))
     check_option("precision", args.precision, Range(0.001, 1.0))
-    check_option("max-turns", args.max_turns, Range(MIN_TURNS, 10**6, whole=True))
+    check_option("block-turns", args.block_turns, Range(1, 10**4, whole=True))
+    least = MIN_BLOCKS * args.block_turns
+    check_option("max-turns", args.max_turns, Range(least, 10**6, whole=True))
     if args.rollouts is not None:
         check_option("rollouts", args.rollouts, Range(1, 10**6, whole=True))
     check_seed(args.seed)
@@ -178,32 +186,41 @@ def _measure(args: BenchmarkArgs, versions: Sequence[Version], content: dict[str
         MuteError: If a process fails.
     """
     for num_envs in args.num_envs:
-        times: dict[str, Times] = {}
-        ready: dict[str, dict[str, Any]] = {}
+        blocks: list[Block] = []
+
+        def begin(number: int, num_envs: int = num_envs) -> list[Worker]:
+            seed = args.seed + number
+            return [Worker(version, args.task, num_envs, seed) for version in versions]
+
+        taken = take_blocks(begin, args.block_turns, args.seed)
         try:
-            with contextlib.ExitStack() as stack, _progress(args, num_envs) as show:
-                workers = [Worker(version, args.task, num_envs) for version in versions]
-                for worker in workers:
-                    stack.enter_context(worker)
-                    ready[worker.version.name] = worker.ready
-                content["versions"] = {name: _versions(each) for name, each in ready.items()}
-                for times in take_turns(workers, args.seed):
-                    show(times)
-                    if _enough(times, args):
+            with contextlib.closing(taken), _progress(args, num_envs) as show:
+                for blocks in taken:
+                    show(blocks)
+                    if _enough(blocks, args):
                         break
         except MuteError as error:
             raise MuteError(f"--num-envs {num_envs}: {error}") from error
         finally:
-            if times:
-                content["rates"].append(_row(num_envs, times, ready, args.precision))
+            if blocks:
+                ready = blocks[0].ready
+                content["versions"] = {name: _versions(each) for name, each in ready.items()}
+                content["rates"].append(_row(num_envs, blocks, args.precision))
 
 
-def _enough(times: Mapping[str, Times], args: BenchmarkArgs) -> bool:
+def _turns(blocks: Sequence[Block]) -> int:
+    return sum(block.turns for block in blocks)
+
+
+def _enough(blocks: Sequence[Block], args: BenchmarkArgs) -> bool:
     """Return whether there is no need for another turn, or no leave."""
-    turns = len(times["new"]["loop"])
+    turns = _turns(blocks)
     if args.rollouts is not None:
         return turns >= args.rollouts
-    return turns >= args.max_turns or is_precise(times, args.precision)
+    if turns >= args.max_turns:
+        return True
+    whole = blocks[-1].turns == args.block_turns
+    return whole and is_precise(times_of(blocks), args.precision)
 
 
 def _versions(ready: Mapping[str, Any]) -> dict[str, Any]:
@@ -211,14 +228,13 @@ def _versions(ready: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in ready.items() if name not in left_out}
 
 
-def _row(
-    num_envs: int,
-    times: Mapping[str, Times],
-    ready: Mapping[str, Mapping[str, Any]],
-    precision: float,
-) -> dict[str, Any]:
+def _row(num_envs: int, blocks: Sequence[Block], precision: float) -> dict[str, Any]:
     """Return the figures of one number of environments, as plain data."""
-    row = {"num_envs": num_envs, "turns": len(times["new"]["loop"])}
+    times = times_of(blocks)
+    ready = {name: dict(about) for name, about in blocks[0].ready.items()}
+    for name, about in ready.items():
+        about["peak_memory_mb"] = max(block.ready[name]["peak_memory_mb"] for block in blocks)
+    row = {"num_envs": num_envs, "blocks": len(blocks), "turns": _turns(blocks)}
     row |= {"not_precise": shortfall(times, precision)}
     row |= figures_of(times["new"], ready["new"])
     if "old" in times:
@@ -229,9 +245,7 @@ def _row(
 
 
 @contextlib.contextmanager
-def _progress(
-    args: BenchmarkArgs, num_envs: int
-) -> Iterator[Callable[[Mapping[str, Times]], None]]:
+def _progress(args: BenchmarkArgs, num_envs: int) -> Iterator[Callable[[Sequence[Block]], None]]:
     """Show the turns of one number of environments; yield what is to be called after each."""
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("turn {task.completed}"))
     ends = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
@@ -240,8 +254,8 @@ def _progress(
         name = f"{num_envs} environments"
         shown = progress.add_task(name, total=args.rollouts)
 
-        def show(times: Mapping[str, Times]) -> None:
-            turns, width = len(times["new"]["loop"]), widest(times)[1]
+        def show(blocks: Sequence[Block]) -> None:
+            turns, width = _turns(blocks), widest(times_of(blocks))[1]
             known = f", ±{width:.1%}" if math.isfinite(width) else ""
             total = args.rollouts or _turns_in_all(turns, width, args)
             progress.update(shown, completed=turns, total=total, description=f"{name}{known}")
@@ -254,7 +268,7 @@ def _turns_in_all(turns: int, width: float, args: BenchmarkArgs) -> int | None:
     if not math.isfinite(width):
         return None
     needed = math.ceil(turns * (width / args.precision) ** 2)
-    return min(args.max_turns, max(turns, MIN_TURNS, needed))
+    return min(args.max_turns, max(turns, MIN_BLOCKS * args.block_turns, needed))
 
 
 def _peer_rows(args: BenchmarkArgs, peers: Sequence[str]) -> list[dict[str, Any]]:
@@ -287,7 +301,7 @@ def _tell(args: BenchmarkArgs, content: Mapping[str, Any]) -> None:
         return
     print("\n".join(f"{CAPTIONS[name]}: {sentence}" for name, sentence in content["parts"].items()))
     for row in content["rates"]:
-        title = f"{row['num_envs']} environments, medians of {row['turns']} turns, 95 % intervals"
+        title = f"{row['num_envs']} environments, medians of {row['blocks']} blocks, 95 % intervals"
         table = list(_table(row))
         print_table(f"{title}; {content['machine']}", table, list(table[0]))
         if row["not_precise"]:

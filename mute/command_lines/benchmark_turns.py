@@ -1,13 +1,18 @@
 """Processes that live side by side and take turns: one works while the others wait.
 
 What shares a machine with others cannot be timed once. So every part is timed again and again, a
-turn after the other, in an order that is drawn anew for every second turn and then gone backwards:
-no part always follows another, and a machine that gets slower within a turn favours none. Parts
-that are compared between versions stand beside each other. `benchmark_worker` does the work.
+turn after the other. The loop comes first, and what the others of a turn do again is its rollout.
+Their order is drawn anew for every second turn and then gone backwards: no part always follows
+another, and a machine that gets slower within a turn favours none. Parts that are compared between
+versions stand beside each other. `benchmark_worker` does the work.
+
+Turns of the same processes resemble each other more than those of others: memory lies where it
+lies, and a training goes on. So after a few turns, a block, all processes end and others begin.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import random
@@ -15,34 +20,55 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from mute.support.errors import MuteError
 from mute.support.provenance import REPOSITORY
+from mute.support.threads import without_own_settings
 
 __all__ = [
     "THIS",
+    "Block",
     "Times",
     "Version",
     "Worker",
     "other_version",
     "shuffled_orders",
-    "take_turns",
+    "take_blocks",
+    "times_of",
 ]
 
 _PROGRAM = Path(__file__).with_name("benchmark_worker.py")
 
-_PARTS = ("loop", "engine", "nominal_engine", "environment")
-"""What a worker does on demand."""
+_FIRST_PART = "loop"
+"""What a worker does first in each turn."""
+
+_PARTS = ("engine", "nominal_engine", "environment")
+"""What a worker does then on demand."""
 
 _WAITING = ("OMP_WAIT_POLICY", "GOMP_SPINCOUNT")
-"""What `support.threads` has set in this process; each version sets what it finds right."""
+"""How threads wait, which each version sets as it finds right."""
 
-Times = dict[str, list[float]]
-"""How long each part took, s, turn by turn."""
+Times = dict[str, list[list[float]]]
+"""How long each part took, s: block by block, turn by turn."""
+
+
+@dataclass
+class Block:
+    """What came of processes that began together, one for each version."""
+
+    ready: dict[str, dict[str, Any]]
+    """What each says of itself, by version."""
+    times: dict[str, dict[str, list[float]]] = field(default_factory=dict)
+    """How long each part took, s: by version and part, turn by turn."""
+
+    @property
+    def turns(self) -> int:
+        """Turns that were timed."""
+        return min((len(times[_FIRST_PART]) for times in self.times.values()), default=0)
 
 
 @dataclass(frozen=True)
@@ -58,7 +84,8 @@ class Version:
 
     def environ(self) -> dict[str, str]:
         """Return the environment variables of its processes."""
-        variables = {key: value for key, value in os.environ.items() if key not in _WAITING}
+        given = without_own_settings(os.environ)
+        variables = {key: value for key, value in given.items() if key not in _WAITING}
         own = self.checkout == REPOSITORY
         others = variables.pop("PYTHONPATH", "") if own else ""
         variables.pop("PYTHONPATH", None)
@@ -96,19 +123,20 @@ def other_version(against: str) -> Version:
 class Worker:
     """A training of some version and size, in a process of its own; a context manager."""
 
-    def __init__(self, version: Version, task: str, num_envs: int) -> None:
+    def __init__(self, version: Version, task: str, num_envs: int, seed: int = 0) -> None:
         """Say what it will be; the process starts on entering.
 
         Args:
             version: Of which version.
             task: Name of the task; `module:task` imports a module first.
             num_envs: Number of robots.
+            seed: Of the training.
         """
         self.version = version
         self.ready: dict[str, Any] = {}
         """What it says of itself once it is: versions, control steps of a part, memory."""
         # -P keeps the modules beside the program from passing for others of the same name.
-        self._command = [version.python, "-P", str(_PROGRAM), task, str(num_envs)]
+        self._command = [version.python, "-P", str(_PROGRAM), task, str(num_envs), str(seed)]
 
     def __enter__(self) -> Worker:
         """Start it and wait until its first iterations are done.
@@ -182,7 +210,7 @@ class Worker:
 
 
 def shuffled_orders(names: Sequence[str], seed: int) -> Iterator[list[tuple[str, str]]]:
-    """Yield for each turn the order of (part, version's name), without end.
+    """Yield for each turn the order of (part, version's name), without end; the loop is first.
 
     Args:
         names: Of the versions.
@@ -190,34 +218,54 @@ def shuffled_orders(names: Sequence[str], seed: int) -> Iterator[list[tuple[str,
     """
     draw = random.Random(seed)
     while True:
-        parts = draw.sample(_PARTS, len(_PARTS))
-        order = [(part, name) for part in parts for name in draw.sample(names, len(names))]
-        yield order
-        yield order[::-1]
+        first, parts = draw.sample(names, len(names)), draw.sample(_PARTS, len(_PARTS))
+        rest = [(part, name) for part in parts for name in draw.sample(names, len(names))]
+        yield [(_FIRST_PART, name) for name in first] + rest
+        yield [(_FIRST_PART, name) for name in first[::-1]] + rest[::-1]
 
 
-def take_turns(workers: Sequence[Worker], seed: int) -> Iterator[dict[str, Times]]:
-    """Time every part of every worker turn by turn, without end, after one that only warms up.
+def take_blocks(
+    begin: Callable[[int], Sequence[Worker]], turns: int, seed: int
+) -> Generator[list[Block], None, None]:
+    """Time every part of every worker, block by block and turn by turn, without end.
 
     Args:
-        workers: Each of another version.
+        begin: Returns the workers of a block, one for each version, which have not started yet; is
+            told the block's number, from 0 on.
+        turns: Timed turns of a block, after one that only warms up.
         seed: Of the order.
 
     Yields:
-        The times so far by version's name and part, after each whole turn.
+        All blocks that have a whole turn, after each turn: the same list again and again.
 
     Raises:
         MuteError: If a worker fails or is gone.
     """
-    by_name = {worker.version.name: worker for worker in workers}
-    times: dict[str, Times] = {name: {} for name in by_name}
-    orders = shuffled_orders(list(by_name), seed)
-    _turn(by_name, next(orders))
-    for order in orders:
-        for name, of_turn in _turn(by_name, order).items():
-            for part, seconds in of_turn.items():
-                times[name].setdefault(part, []).append(seconds)
-        yield times
+    blocks: list[Block] = []
+    orders: Iterator[list[tuple[str, str]]] | None = None
+    while True:
+        with contextlib.ExitStack() as stack:
+            workers = {each.version.name: each for each in begin(len(blocks))}
+            for worker in workers.values():
+                stack.enter_context(worker)
+            orders = orders or shuffled_orders(list(workers), seed)
+            _turn(workers, next(shuffled_orders(list(workers), seed)))
+            block = Block({name: worker.ready for name, worker in workers.items()})
+            for _ in range(turns):
+                for name, of_turn in _turn(workers, next(orders)).items():
+                    for part, seconds in of_turn.items():
+                        block.times.setdefault(name, {}).setdefault(part, []).append(seconds)
+                if block.turns == 1:
+                    blocks.append(block)
+                yield blocks
+
+
+def times_of(blocks: Sequence[Block]) -> dict[str, Times]:
+    """Return by version how long its parts took in some blocks, one or more."""
+    return {
+        name: {part: [block.times[name][part] for block in blocks] for part in parts}
+        for name, parts in blocks[0].times.items()
+    }
 
 
 def _turn(

@@ -1,6 +1,6 @@
 """A training that is timed part by part, on demand; `benchmark_turns` starts it by its path.
 
-    python -P benchmark_worker.py TASK NUM_ENVS
+    python -P benchmark_worker.py TASK NUM_ENVS SEED
 
 It imports MUTE from wherever `PYTHONPATH` or its interpreter has it, which may be another version:
 it uses nothing but what older ones have as well. The engine may be `mjbatch` or MuJoCo's own batch.
@@ -31,6 +31,9 @@ ACTION_STD = 0.4
 _FIRST_ITERATIONS = 3
 """Iterations before anything is timed: memory has reached its peak, and the estimator learns."""
 
+_READ = ("sensordata", "actuator_force")
+"""Arrays that an environment reads after each call of the engine, beside the state."""
+
 Seconds = dict[str, float]
 """How long parts took, s."""
 
@@ -47,7 +50,7 @@ def main() -> None:
     errors: Any = importlib.import_module("mute.support.errors")
     _check_tree()
     try:
-        parts, ready = _prepare(sys.argv[1], int(sys.argv[2]))
+        parts, ready = _prepare(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
         _check_tree()
         answer({"ready": ready})
         for line in sys.stdin:
@@ -56,7 +59,9 @@ def main() -> None:
         answer({"error": " ".join(str(error).split()) or type(error).__name__})
 
 
-def _prepare(task: str, num_envs: int) -> tuple[dict[str, Callable[[], Seconds]], dict[str, Any]]:
+def _prepare(
+    task: str, num_envs: int, seed: int
+) -> tuple[dict[str, Callable[[], Seconds]], dict[str, Any]]:
     """Set up this process as `train.py` does; return its parts and what is to be known of it."""
     from mute.support.memory import keep_freed_memory
     from mute.support.threads import configure_threads
@@ -67,7 +72,7 @@ def _prepare(task: str, num_envs: int) -> tuple[dict[str, Callable[[], Seconds]]
     from mute.support.processes import peak_memory_mb
 
     load_plugins()
-    training = _Training(task, num_envs)
+    training = _Training(task, num_envs, seed)
     memory = peak_memory_mb()
     replay = _Replay(training)
     parts = {
@@ -104,7 +109,7 @@ def _about() -> dict[str, str]:
 class _Training:
     """A training without a log, an iteration at a time, in rsl_rl's own loop."""
 
-    def __init__(self, task: str, num_envs: int) -> None:
+    def __init__(self, task: str, num_envs: int, seed: int = 0) -> None:
         """Begin one and do its first iterations."""
         import torch
 
@@ -116,7 +121,7 @@ class _Training:
         name = task_name(task)
         cfg = make_task(name)
         try:
-            env = dataclasses.replace(cfg.env, num_envs=num_envs)
+            env = dataclasses.replace(cfg.env, num_envs=num_envs, seed=seed)
             agent = dataclasses.replace(cfg.agent, init_std=ACTION_STD)
             cfg = dataclasses.replace(cfg, env=env, agent=agent)
         except ValueError as error:  # too few robots, say
@@ -198,10 +203,16 @@ class _Replay:
 
 
 class _Batch:
-    """The engine alone: a batch of simulations of an environment's model, with nothing bound."""
+    """The engine alone: a batch of simulations of an environment's model, called as that does.
+
+    It fills the arrays that the environment reads, and records those that the environment records:
+    `mjbatch`, which records nothing, has the sensors' past in the model.
+    """
 
     def __init__(self, env: Any) -> None:  # noqa: ANN401
         """Make nominal robots that stand, as many as the environment has, on as many threads."""
+        import numpy as np
+
         from mute.support.threads import core_share
 
         module, self.name = _engine_module()
@@ -210,6 +221,11 @@ class _Batch:
         self._ctrl = self._batch.bind("ctrl")
         own = module.__name__ == "mujoco.batch"
         self.state = self._batch.state if own else self._batch.bind("state")
+        past = ("history",) if not own and env.simulation.model.nhistory else ()
+        of_kind = () if own else (np.float32,)
+        self._read = [self._batch.bind(name, *of_kind) for name in (*_READ, *past)]
+        recorded = getattr(env.simulation, "substeps", {})
+        self._records = {name: np.zeros_like(rows.numpy()) for name, rows in recorded.items()}
         """Live rows, all that a simulation continues from. Shape: (num_envs, num_state)."""
         self._batch.reset(keyframe=env.simulation.model.key("stand").id)
         self.standing = self.state[0].copy()
@@ -239,10 +255,16 @@ class _Batch:
         start = time.perf_counter()
         for step, target in enumerate(targets):
             self._ctrl[:] = target
-            self._batch.step(nstep=decimation)
+            self._step(decimation)
             if ended is not None and ended[step].any():
                 self.state[ended[step]] = self.standing
         return time.perf_counter() - start
+
+    def _step(self, decimation: int) -> None:
+        if self._records:
+            self._batch.rollout(decimation, record=tuple(self._records), out=self._records)
+        else:
+            self._batch.step(nstep=decimation)
 
 
 def _engine_module() -> tuple[Any, str]:

@@ -15,6 +15,7 @@ __all__ = ["BenchmarkFiles", "benchmark_page"]
 _MEASURED = {
     "num_envs": ("environments", "{}"),
     "version": ("version", "{}"),
+    "blocks": ("blocks", "{}"),
     "turns": ("turns", "{}"),
     **{name: (caption, "{}") for name, caption in CAPTIONS.items()},
     "peak_memory_mb": ("memory (MB)", "{}"),
@@ -45,6 +46,20 @@ _PARTS_OF_SOUND = {
     "lone energies": "one robot: levels without sound",
     "lone walk": "one robot: everything",
 }
+
+_INTERVALS = (
+    "Turns are taken in blocks of a few, each with fresh processes and a seed of its own. Each "
+    "figure is the median over the blocks' medians, and in brackets stands its 95 % interval, from "
+    "one of these to another (binomial, distribution-free). It is of block medians, as the turns "
+    "of a block depend on each other; and blocks end as soon as it is narrow, which makes it "
+    "slightly optimistic."
+)
+_OF_TURNS = (
+    "Each figure is the median over turns of one pair of processes, and in brackets stands the "
+    "interval that would hold the true one at 95 % if turns were independent. They depend on each "
+    "other, and other processes may run at another speed, so it is too narrow."
+)
+"""What is said of a file from before there were blocks."""
 
 
 @dataclass(frozen=True)
@@ -96,18 +111,19 @@ def _training(measured: Mapping[str, Any]) -> str:
         f"{parts}\n"
         "- memory: the most that a process has held after three iterations of training, without "
         "what the other parts need.\n\n"
-        "Each figure is the median over turns, and in brackets stands its 95 % interval, from one "
-        "order statistic to another (binomial, distribution-free). A turn does every part once, of "
-        "both versions where there are two, which wait for each other in processes of their own; "
-        "the order is drawn anew for every second turn and then gone backwards. A ratio is taken "
-        "within a turn, so it is not quite the quotient of two medians. A training goes on from "
-        "turn to turn; its first actions have a standard deviation of 0.4."
+        f"{_INTERVALS if all('blocks' in row for row in measured['rates']) else _OF_TURNS} A turn "
+        "does every part once, of both versions where there are two, which wait for each other in "
+        "processes of their own; the loop is first, and the order of the rest is drawn anew for "
+        "every second turn and then gone backwards. A ratio is taken within a turn, so it is not "
+        "quite the quotient of two medians. A training goes on from turn to turn; its first "
+        "actions have a standard deviation of 0.4."
     )
 
 
 def _lines(row: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the lines of one number of environments: new, old, and new over old."""
-    common = {"num_envs": row["num_envs"], "turns": row["turns"]}
+    common = {"num_envs": row["num_envs"], "blocks": row.get("blocks")}
+    common["turns"] = row["turns"]
     yield common | {"version": "new"} | _cells(row, "{:,.0f}")
     if "old" in row:
         yield common | {"version": "old"} | _cells(row["old"], "{:,.0f}")

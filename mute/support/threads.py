@@ -22,6 +22,7 @@ import functools
 import math
 import os
 import sys
+from collections.abc import Mapping
 
 from mute.support.cgroups import cpu_quota
 
@@ -32,7 +33,11 @@ __all__ = [
     "usable_cores",
     "use_collection_threads",
     "use_learning_threads",
+    "without_own_settings",
 ]
+
+_own: dict[str, str] = {}
+"""What `configure_threads` has set in this process, and to what."""
 
 _SPIN_COUNT = 1000
 """Rounds that a waiting thread of GNU OpenMP spins before it sleeps: microseconds, enough to bridge
@@ -48,11 +53,19 @@ def configure_threads() -> None:
     of these two is then left alone as well, since each overrides a part of the other.
     """
     if _given_threads() is None:
-        os.environ["OMP_NUM_THREADS"] = str(core_share())
+        os.environ["OMP_NUM_THREADS"] = _own["OMP_NUM_THREADS"] = str(core_share())
     if "OMP_WAIT_POLICY" in os.environ or "GOMP_SPINCOUNT" in os.environ:
         return
-    os.environ["OMP_WAIT_POLICY"] = "passive"
-    os.environ["GOMP_SPINCOUNT"] = str(_SPIN_COUNT)
+    os.environ["OMP_WAIT_POLICY"] = _own["OMP_WAIT_POLICY"] = "passive"
+    os.environ["GOMP_SPINCOUNT"] = _own["GOMP_SPINCOUNT"] = str(_SPIN_COUNT)
+
+
+def without_own_settings(environ: Mapping[str, str]) -> dict[str, str]:
+    """Return an environment without what `configure_threads` has set in this process.
+
+    It is for a program that decides about its threads itself. What the user has set stays.
+    """
+    return {key: value for key, value in environ.items() if _own.get(key) != value}
 
 
 def limit_operator_threads() -> None:

@@ -18,6 +18,7 @@ from mute import tasks
 from mute.command_lines import benchmark
 from mute.command_lines.arguments import parse
 from mute.command_lines.benchmark_figures import figures_of, ratios, shortfall
+from mute.command_lines.benchmark_turns import Block, Times, times_of
 from mute.envs.quadruped_env import NUM_ACTIONS
 from mute.envs.scene import STAND_JOINT_POS, build_scene
 from mute.support import provenance
@@ -38,7 +39,7 @@ def test_two_versions_take_turns_and_every_part_of_both_is_printed_as_json(capsy
     assert content["versions"]["old"] == content["versions"]["new"]
     assert content["versions"]["old"]["torch"] == torch.__version__
     (row,) = content["rates"]
-    assert (row["num_envs"], row["turns"]) == (4, 1)
+    assert (row["num_envs"], row["blocks"], row["turns"]) == (4, 1, 1)
     for version in (row, row["old"]):
         assert all(version[name] > 0.0 for name in _PARTS)
         # The loop is collection and learning, one after the other.
@@ -46,11 +47,11 @@ def test_two_versions_take_turns_and_every_part_of_both_is_printed_as_json(capsy
         assert 1.0 / version["loop"] == pytest.approx(apart)
         of_nominal = version["loop"] / version["nominal_engine"]
         assert version["loop_over_nominal_engine"] == pytest.approx(of_nominal)
-        assert version["intervals"]["loop"] == [None, None]  # a turn alone has none
+        assert version["intervals"]["loop"] == [None, None]  # a block alone has none
         assert version["peak_memory_mb"] > 100.0
     for name in (*_PARTS, "peak_memory_mb"):
         assert row["new_over_old"][name] == pytest.approx(row[name] / row["old"][name])
-    assert "1 turns are too few for 3.0%" in row["not_precise"]
+    assert "1 blocks are too few for 3.0%" in row["not_precise"]
     itself, gymnasium, mjlab = content["peers"]
     assert [peer["name"] for peer in content["peers"]] == ["mute", "gymnasium", "mjlab"]
     assert (itself["num_envs"], itself["task"]) == (4, "go1_mute")
@@ -85,39 +86,58 @@ def test_a_task_of_a_users_own_module_is_measured(capsys):
     assert content["rates"][0]["loop"] > 0.0
 
 
-def _constructed(loop: Sequence[float], engine: float = 0.5) -> dict[str, list[float]]:
-    """Return times of turns, s, in which the loop's alone differ."""
-    same = {name: [engine] * len(loop) for name in _PARTS}
-    return same | {"loop": list(loop)}
+_READY = {"new": {"control_steps": 48, "peak_memory_mb": 700.0, "engine": "constructed"}}
+
+
+def _constructed(loops: Sequence[Sequence[float]], engine: float = 0.5) -> list[Block]:
+    """Return blocks of turns, s, in which the loop's alone differ."""
+    return [
+        Block(
+            _READY,
+            {"new": {name: [engine] * len(own) for name in _PARTS} | {"loop": list(own)}},
+        )
+        for own in loops
+    ]
+
+
+def _times(loops: Sequence[Sequence[float]]) -> dict[str, Times]:
+    return times_of(_constructed(loops))
 
 
 def _args(*words: str) -> benchmark.BenchmarkArgs:
     return parse(benchmark.BenchmarkArgs, words, "")
 
 
-def _turns_until_enough(loops: Sequence[float], *words: str) -> int:
-    enough = (
-        number
-        for number in range(1, len(loops) + 1)
-        if benchmark._enough({"new": _constructed(loops[:number])}, _args(*words))
-    )
-    return next(enough)
+def _turns_until_enough(loops: Sequence[Sequence[float]], *words: str) -> int:
+    """Return how many turns are taken, of blocks that would go on."""
+    args = _args(*words)
+    turns = 0
+    for number in range(len(loops)):
+        for last in range(1, args.block_turns + 1):
+            turns += 1
+            taken = [*loops[:number], loops[number][:last]]
+            if benchmark._enough(_constructed(taken), args):
+                return turns
+    raise AssertionError("never enough")
 
 
-def test_turns_that_all_say_the_same_are_enough_once_there_are_ten():
-    assert _turns_until_enough([1.0] * 100) == 10
+def test_blocks_that_all_say_the_same_are_enough_once_there_are_six():
+    assert _turns_until_enough([[1.0] * 3] * 20) == 18
+    assert _turns_until_enough([[1.0] * 5] * 20, "--block-turns", "5") == 30
 
 
-def test_turns_go_on_until_half_the_interval_of_every_ratio_is_within_the_precision():
-    # Of turns of 0.94, 1.00 and 1.06 s, a third each, it takes many until neither bound is of the
+def test_blocks_go_on_until_half_the_interval_of_every_ratio_is_within_the_precision():
+    # Of blocks of 0.94, 1.00 and 1.06 s, a third each, it takes many until neither bound is of the
     # outer ones.
-    loops = [0.94, 1.0, 1.06] * 30
-    turns = _turns_until_enough(loops, "--max-turns", "90")
-    ratios = sorted(0.5 / loop for loop in loops[:turns])
-    before = sorted(0.5 / loop for loop in loops[: turns - 1])
-    assert turns > 20
-    assert _half_width(ratios) <= 0.03 < _half_width(before)
-    assert _turns_until_enough(loops, "--precision", "0.07") == 10
+    loops = [[seconds] * 3 for seconds in [0.94, 1.0, 1.06] * 30]
+    turns = _turns_until_enough(loops, "--max-turns", "270")
+    ratios = [0.5 / seconds for seconds, *_ in loops]
+    blocks = turns // 3
+    assert turns % 3 == 0  # it is looked at after whole blocks alone
+    assert blocks > 20
+    assert _half_width(sorted(ratios[:blocks])) <= 0.03
+    assert _half_width(sorted(ratios[: blocks - 1])) > 0.03
+    assert _turns_until_enough(loops, "--precision", "0.07") == 18
 
 
 def _half_width(ratios: Sequence[float]) -> float:
@@ -131,47 +151,72 @@ def _half_width(ratios: Sequence[float]) -> float:
     return 0.5 * (ratios[number - rank] - ratios[rank - 1]) / middle
 
 
-def test_turns_that_never_agree_end_at_the_most_and_that_is_told_in_one_line():
-    loops = [0.5, 2.0] * 20
+def test_turns_that_agree_within_their_block_alone_do_not_make_the_interval_narrow():
+    # Sixty turns, ten of each block: were each a value, the interval would be of no width at all.
+    loops = [[0.9] * 10, [1.1] * 10, *[[1.0] * 10] * 4]
+    loop = figures_of(_times(loops)["new"], _READY["new"])
+    assert loop["loop"] == 48.0
+    assert loop["intervals"]["loop"] == [48.0 / 1.1, 48.0 / 0.9]
+
+
+def test_an_interval_of_the_medians_of_dependent_turns_holds_the_true_one_as_often_as_it_says():
+    # A process has a speed of its own, and its turns are as an autoregression of 0.5.
+    generator = np.random.default_rng(0)
+    held, held_by_turns = 0, 0
+    for _ in range(300):
+        loops = []
+        for _ in range(8):
+            level = wave = 0.05 * generator.standard_normal()
+            turns = []
+            for _ in range(3):
+                wave = level + 0.5 * (wave - level) + 0.02 * generator.standard_normal()
+                turns.append(math.exp(wave))
+            loops.append(turns)
+        held += _holds(loops, 48.0)
+        held_by_turns += _holds([[turn] for turns in loops for turn in turns], 48.0)
+    assert held / 300 >= 0.95
+    assert held_by_turns / 300 < 0.9  # were each turn a value of its own
+
+
+def _holds(loops: Sequence[Sequence[float]], rate: float) -> bool:
+    low, high = figures_of(_times(loops)["new"], _READY["new"])["intervals"]["loop"]
+    return low <= rate <= high
+
+
+def test_blocks_that_never_agree_end_at_the_most_turns_and_that_is_told_in_one_line():
+    loops = [[0.5] * 3, [2.0] * 3] * 20
     assert _turns_until_enough(loops, "--max-turns", "40") == 40
-    told = shortfall({"new": _constructed(loops)}, 0.03)
-    assert told == ("40 turns are too few for 3.0%: the 95% interval of loop / engine is ±60.0%")
+    told = shortfall(_times(loops), 0.03)
+    assert told == ("40 blocks are too few for 3.0%: the 95% interval of loop / engine is ±60.0%")
 
 
 def test_as_many_turns_are_taken_as_asked_for_however_precise():
-    assert _turns_until_enough([1.0] * 100, "--rollouts", "25") == 25
-    assert _turns_until_enough([0.5, 2.0] * 20, "--rollouts", "3") == 3
+    assert _turns_until_enough([[1.0] * 3] * 20, "--rollouts", "25") == 25
+    assert _turns_until_enough([[0.5] * 3, [2.0] * 3], "--rollouts", "4") == 4
 
 
 def test_ratios_are_taken_turn_by_turn():
     # Turns say 1/2, 1/6 and 1/2; the medians of the times, 1 and 6, would say 1/6.
-    times = {name: [1.0, 1.0, 3.0] for name in _PARTS} | {"loop": [2.0, 6.0, 6.0]}
+    times: Times = {name: [[1.0, 1.0, 3.0]] for name in _PARTS} | {"loop": [[2.0, 6.0, 6.0]]}
     assert ratios({"new": times})["loop_over_engine"].median == 0.5
-    both = ratios({"new": times, "old": {name: [6.0, 6.0, 9.0] for name in _PARTS}})
+    both = ratios({"new": times, "old": {name: [[6.0, 6.0, 9.0]] for name in _PARTS}})
     assert both["loop_new_over_old"].median == 1.5
     assert both["engine_new_over_old"].median == 6.0
 
 
-def test_rates_are_control_steps_over_the_median_time():
-    ready = {"control_steps": 48, "peak_memory_mb": 700.0}
-    figures = figures_of(_constructed([2.0] * 5 + [3.0] * 4), ready)
+def test_rates_are_control_steps_over_the_median_over_blocks_of_the_medians_of_turns():
+    figures = figures_of(
+        _times([[2.0, 2.0, 9.0]] * 5 + [[3.0, 3.0, 0.1]] * 4)["new"], _READY["new"]
+    )
     assert (figures["loop"], figures["engine"]) == (24.0, 96.0)
     assert figures["intervals"]["loop"] == [16.0, 24.0]
     assert figures["peak_memory_mb"] == 700.0
 
 
-class _Constructed:
-    """Stands in for a worker that is never asked."""
-
-    def __init__(self, version, *_: object) -> None:
-        self.version = version
-        self.ready = {"control_steps": 48, "peak_memory_mb": 700.0, "engine": "constructed"}
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        pass
+def test_memory_is_the_most_of_any_block():
+    blocks = _constructed([[1.0], [1.0]])
+    blocks[1].ready = {"new": {**_READY["new"], "peak_memory_mb": 800.0}}
+    assert benchmark._row(4, blocks, 0.03)["peak_memory_mb"] == 800.0
 
 
 @pytest.mark.parametrize(
@@ -181,17 +226,16 @@ class _Constructed:
 def test_what_was_measured_before_a_stop_is_written_and_printed(
     stop, told, tmp_path, monkeypatch, capsys
 ):
-    monkeypatch.setattr(benchmark, "Worker", _Constructed)
     sizes = iter([False, True])
 
-    def turns(*_: object):
+    def blocks(*_: object):
         stops = next(sizes)
         for number in (1, 2, 3):
-            yield {"new": _constructed([2.0] * number)}
+            yield _constructed([[2.0] * number])
         if stops:
             raise stop
 
-    monkeypatch.setattr(benchmark, "take_turns", turns)
+    monkeypatch.setattr(benchmark, "take_blocks", blocks)
     argv = ["--num-envs", "4", "8", "--out", str(tmp_path / "rates.json")]
     # The first size has its three turns, the second one is cut short after as many.
     rollouts = iter([False, False, True, False, False, False])
@@ -202,17 +246,15 @@ def test_what_was_measured_before_a_stop_is_written_and_printed(
     assert content["stopped"] == told
     assert [(row["num_envs"], row["turns"]) for row in content["rates"]] == [(4, 3), (8, 3)]
     assert [row["loop"] for row in content["rates"]] == [24.0, 24.0]
-    assert "8 environments, medians of 3 turns" in capsys.readouterr().out
+    assert "8 environments, medians of 1 blocks" in capsys.readouterr().out
 
 
 def test_nothing_is_written_over_a_file_when_nothing_was_measured(tmp_path, monkeypatch):
-    monkeypatch.setattr(benchmark, "Worker", _Constructed)
-
-    def turns(*_: object):
+    def blocks(*_: object):
         raise KeyboardInterrupt
         yield
 
-    monkeypatch.setattr(benchmark, "take_turns", turns)
+    monkeypatch.setattr(benchmark, "take_blocks", blocks)
     out = tmp_path / "rates.json"
     out.write_text("earlier")
     with pytest.raises(KeyboardInterrupt):
@@ -229,7 +271,9 @@ def test_nothing_is_written_over_a_file_when_nothing_was_measured(tmp_path, monk
         (["--peers", "isaac"], "--peers"),
         (["--peers", "mjlab,mjlab"], "--peers"),
         (["--precision", "0"], "--precision must be"),
-        (["--max-turns", "9"], "--max-turns must be"),
+        (["--max-turns", "17"], "--max-turns must be"),
+        (["--block-turns", "11"], "--max-turns must be"),
+        (["--block-turns", "0"], "--block-turns must be"),
         (["--seeds", "1", "1"], "--seeds must name each but once"),
         (["--against", "/nowhere/python"], "'/nowhere/python' is no interpreter"),
         (["--against", f"{sys.executable}:/nowhere"], "checkout of MUTE after ':', got '/nowhere'"),

@@ -20,8 +20,10 @@ from mute.command_lines.benchmark_turns import (
     Worker,
     other_version,
     shuffled_orders,
-    take_turns,
+    take_blocks,
+    times_of,
 )
+from mute.support import threads
 from mute.support.errors import MuteError
 from mute.tasks import DEFAULT_TASK
 
@@ -87,6 +89,8 @@ def test_nominal_robots_do_the_same_in_every_turn(replay):
 
 def test_a_turn_has_every_part_of_every_version_once_and_the_versions_side_by_side():
     for order in itertools.islice(shuffled_orders(["new", "old"], 0), 20):
+        # What engine and environment do again is the rollout of the loop before them.
+        assert {part for part, _ in order[:2]} == {"loop"}
         assert len(set(order)) == len(order) == 8
         assert all(order[at][0] == order[at + 1][0] for at in range(0, 8, 2))
 
@@ -94,7 +98,8 @@ def test_a_turn_has_every_part_of_every_version_once_and_the_versions_side_by_si
 def test_no_part_comes_after_another_more_often_than_before_it():
     orders = list(itertools.islice(shuffled_orders(["new", "old"], 3), 40))
     assert len({tuple(order) for order in orders}) > 20
-    for one, two in itertools.combinations(orders[0], 2):
+    pairs = [*itertools.combinations(orders[0][:2], 2), *itertools.combinations(orders[0][2:], 2)]
+    for one, two in pairs:
         assert sum(order.index(one) < order.index(two) for order in orders) == 20
 
 
@@ -111,18 +116,60 @@ class _Counted:
 
     def __init__(self, name: str) -> None:
         self.version = Version(name, "python", None)
+        self.ready = {"name": name}
+        self.open = False
         self._calls = itertools.count()
+
+    def __enter__(self):
+        self.open = True
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.open = False
 
     def time(self, part: str) -> dict[str, float]:
         return {part: float(next(self._calls))}
 
 
-def test_the_first_turn_is_no_figure():
-    workers = [_Counted("new"), _Counted("old")]
-    times = next(take_turns(workers, 0))  # pyright: ignore[reportArgumentType]
+def _counted_blocks(turns: int, begun: list[list[_Counted]]):
+    def begin(number: int) -> list[_Counted]:
+        assert number == len(begun)
+        begun.append([_Counted("new"), _Counted("old")])
+        return begun[-1]
+
+    return take_blocks(begin, turns, 0)  # pyright: ignore[reportArgumentType]
+
+
+def test_the_first_turn_of_a_block_is_no_figure():
+    for number, blocks in enumerate(itertools.islice(_counted_blocks(1, []), 3)):
+        assert len(blocks) == number + 1
+        for of_version in blocks[-1].times.values():
+            # The first turn took the answers 0 to 3.
+            assert sorted(second for (second,) in of_version.values()) == [4.0, 5.0, 6.0, 7.0]
+
+
+def test_each_block_has_its_turns_from_workers_of_its_own_and_ends_them():
+    begun: list[list[_Counted]] = []
+    taken = _counted_blocks(2, begun)
+    sizes = [[block.turns for block in blocks] for blocks in itertools.islice(taken, 5)]
+    assert sizes == [[1], [2], [2, 1], [2, 2], [2, 2, 1]]
+    assert [[worker.open for worker in workers] for workers in begun] == [
+        [False, False],
+        [False, False],
+        [True, True],
+    ]
+    taken.close()
+    assert not any(worker.open for worker in begun[-1])
+
+
+def test_times_are_told_by_version_and_part_block_by_block():
+    blocks = next(itertools.islice(_counted_blocks(2, []), 3, None))
+    times = times_of(blocks)
+    assert set(times) == {"new", "old"}
     for of_version in times.values():
-        # The first turn took the answers 0 to 3.
-        assert sorted(seconds for (seconds,) in of_version.values()) == [4.0, 5.0, 6.0, 7.0]
+        assert set(of_version) == {"loop", "engine", "nominal_engine", "environment"}
+        assert [len(block) for block in of_version["loop"]] == [2, 2]
+    assert times["new"]["loop"][0] == [4.0, 8.0]  # the loop comes first in its turn
 
 
 def test_a_worker_does_each_part_and_says_what_it_is():
@@ -183,6 +230,32 @@ def test_workers_end_with_whoever_is_interrupted_beside_them(tmp_path):
         assert worker._process.poll() is None
         raise KeyboardInterrupt
     assert worker._process.poll() is not None
+
+
+def test_a_worker_trains_with_the_seed_that_it_is_given():
+    one, other = (benchmark_worker._Training(DEFAULT_TASK, 4, seed) for seed in (3, 4))
+    assert one.runner.env.env.cfg.seed == 3
+    fields = (each.runner.env.env.simulation.field("geom_friction") for each in (one, other))
+    assert not torch.equal(*fields)
+
+
+def test_the_engine_fills_and_records_what_it_does_in_a_training(training, replay):
+    training.iterate()
+    replay.engine()
+    batch, simulation = replay._batch, training.runner.env.env.simulation
+    assert set(batch._records) == {"sensordata"} == set(simulation.substeps)
+    records = torch.from_numpy(batch._records["sensordata"])
+    assert records.shape == simulation.substeps["sensordata"].shape
+    torch.testing.assert_close(records, simulation.substeps["sensordata"], atol=0.2, rtol=1e-2)
+    assert torch.equal(records[:, -1], torch.from_numpy(batch._read[0].copy()))
+
+
+def test_a_number_of_threads_that_nobody_asked_for_is_left_to_each_version(monkeypatch):
+    monkeypatch.setattr(threads, "_own", {"OMP_NUM_THREADS": "2"})
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    assert "OMP_NUM_THREADS" not in THIS.environ()
+    monkeypatch.setattr(threads, "_own", {})
+    assert THIS.environ()["OMP_NUM_THREADS"] == "2"
 
 
 def test_another_version_finds_its_own_tree_alone(monkeypatch):

@@ -40,12 +40,13 @@ def _version(commit: str, engine: str) -> dict[str, str]:
 
 
 def _measured() -> dict:
-    """Return what the benchmark writes of ten turns in which the old version took twice as long."""
-    new = {part: [1.0] * 5 + [2.0] * 5 for part in PARTS}
-    old = {part: [2.0] * 5 + [4.0] * 5 for part in PARTS}
+    """Return what the benchmark writes of ten blocks in which the old one took twice as long."""
+    new = {part: [[1.0]] * 5 + [[2.0]] * 5 for part in PARTS}
+    old = {part: [[2.0]] * 5 + [[4.0]] * 5 for part in PARTS}
     memory = {"new": 500.0, "old": 1000.0}
     ready = {name: {"control_steps": 24000, "peak_memory_mb": memory[name]} for name in memory}
-    row = {"num_envs": 1024, "turns": 10, "not_precise": None, **figures_of(new, ready["new"])}
+    row = {"num_envs": 1024, "blocks": 10, "turns": 30, "not_precise": None}
+    row |= figures_of(new, ready["new"])
     row["old"] = figures_of(old, ready["old"])
     row["new_over_old"] = comparison({"new": new, "old": old}, memory)
     return {
@@ -73,9 +74,9 @@ def _lines(page: str) -> list[list[str]]:
 
 def test_there_is_a_line_for_each_version_and_one_that_compares_them():
     new, old, compared = _lines(_page(_measured()))
-    assert new[:4] == ["1024", "new", "10", "18,000 [12,000, 24,000]"]
-    assert old[:4] == ["1024", "old", "10", "9,000 [6,000, 12,000]"]
-    assert compared[:4] == ["1024", "new / old", "10", "2.00 [2.00, 2.00]"]
+    assert new[:5] == ["1024", "new", "10", "30", "18,000 [12,000, 24,000]"]
+    assert old[:5] == ["1024", "old", "10", "30", "9,000 [6,000, 12,000]"]
+    assert compared[:5] == ["1024", "new / old", "10", "30", "2.00 [2.00, 2.00]"]
     assert new[-4:] == ["100% [100%, 100%]"] * 3 + ["500"]
     assert compared[-4:] == ["-", "-", "-", "0.50"]
 
@@ -111,6 +112,18 @@ def test_what_is_not_precise_or_not_whole_is_told(change, told):
     assert told not in _page(measured)
     change(measured)
     assert told in _page(measured)
+
+
+def test_the_page_says_what_an_interval_is_of_and_where_it_is_too_narrow():
+    measured = _measured()
+    page = _page(measured)
+    assert "It is of block medians, as the turns of a block depend on each other" in page
+    assert "which makes it slightly optimistic" in page
+    del measured["rates"][0]["blocks"]
+    earlier = _page(measured)
+    assert "block medians" not in earlier
+    assert "so it is too narrow" in earlier
+    assert _lines(earlier)[0][:4] == ["1024", "new", "-", "30"]
 
 
 def test_peers_stand_with_the_machine_that_each_was_timed_on():
