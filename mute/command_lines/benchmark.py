@@ -296,8 +296,7 @@ def _tell(args: BenchmarkArgs, content: Mapping[str, Any]) -> None:
     if args.until_walking:
         shown = [{k: "-" if v is None else v for k, v in row.items()} for row in content["walking"]]
         print_table(f"{content['definition']}; {content['machine']}", shown, list(shown[0]))
-        if content["median_old_over_new"] is not None:
-            print(f"old / new, median over seeds: {content['median_old_over_new']:.2f}")
+        print("".join(_told_of_walks(content)), end="")
         return
     print("\n".join(f"{CAPTIONS[name]}: {sentence}" for name, sentence in content["parts"].items()))
     for row in content["rates"]:
@@ -309,6 +308,16 @@ def _tell(args: BenchmarkArgs, content: Mapping[str, Any]) -> None:
     if content["peers"]:
         shown = [{k: "-" if v is None else v for k, v in row.items()} for row in content["peers"]]
         print_table("peers, control steps/s", shown, list(PEER_COLUMNS))
+
+
+def _told_of_walks(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the lines that compare the versions' walks."""
+    median, neither = content["median_old_over_new"], content["neither_walks"]
+    if median is not None:
+        told = f"{median:.2f}" if isinstance(median, float) else "the old version never walks"
+        yield f"old / new, median over seeds: {told}\n"
+    if neither:
+        yield f"seeds with which neither version walks, left out: {neither}\n"
 
 
 def _table(row: Mapping[str, Any]) -> Iterator[dict[str, str]]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import shutil
 import signal
 import statistics
@@ -57,9 +58,8 @@ def time_to_walk(
         versions: New alone, or new and old.
         task: Name of the task.
         seeds: Of the trainings.
-        content: Gets `definition`, `walking`, a row for each training, and `median_old_over_new`:
-            the median over seeds of how many times as soon the new version walks; None where a
-            training of every seed is missing or never walks.
+        content: Gets `definition`, `walking`, a row for each training, and what `_compared` says
+            of them.
 
     Raises:
         MuteError: If a version has no checkout, or a training or a measurement fails.
@@ -70,23 +70,41 @@ def time_to_walk(
                 f"--until-walking needs a checkout of the {version.name} version, with its train.py"
             )
     rows: list[dict[str, Any]] = []
-    content |= {"definition": DEFINITION, "walking": rows, "median_old_over_new": None}
+    content |= {"definition": DEFINITION, "walking": rows, **_compared(rows)}
     for number, seed in enumerate(seeds):
         for version in list(versions)[:: 1 if number % 2 == 0 else -1]:
             print(f"seed {seed}, {version.name} version", file=sys.stderr)
             rows.append({"seed": seed, "version": version.name, **_walk(version, task, seed)})
-            content["median_old_over_new"] = _median_ratio(rows)
+            content |= _compared(rows)
 
 
-def _median_ratio(rows: Sequence[dict[str, Any]]) -> float | None:
-    """Return the median over seeds of old over new minutes; None if no seed has both."""
-    minutes = {(row["seed"], row["version"]): row["minutes"] for row in rows}
-    ratios = [
-        old / minutes[seed, "new"]
+def _compared(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return how many times as soon the new version walks, over the seeds that both trained with.
+
+    `median_old_over_new` is the median over seeds: 0 for a seed with which the new version never
+    walks, "never" for one with which the old one never does, above all numbers. A seed with which
+    neither walks compares nothing: it is left out and counted as `neither_walks`. Where the median
+    would lie between a number and "never" it is that number, which favours the old version. None
+    if no seed is left.
+    """
+    minutes = {(row["seed"], row["version"]): _or_never(row["minutes"]) for row in rows}
+    pairs = [
+        (old, minutes[seed, "new"])
         for (seed, name), old in minutes.items()
-        if name == "old" and old is not None and minutes.get((seed, "new")) is not None
+        if name == "old" and (seed, "new") in minutes
     ]
-    return statistics.median(ratios) if ratios else None
+    ratios = [old / new for old, new in pairs if math.isfinite(old) or math.isfinite(new)]
+    median = statistics.median(ratios) if ratios else None
+    if median == math.inf:
+        median = statistics.median_low(ratios)
+    return {
+        "median_old_over_new": "never" if median == math.inf else median,
+        "neither_walks": len(pairs) - len(ratios),
+    }
+
+
+def _or_never(minutes: float | None) -> float:
+    return math.inf if minutes is None else minutes
 
 
 def _walk(version: Version, task: str, seed: int) -> dict[str, Any]:
@@ -127,13 +145,19 @@ def _training(
     try:
         yield process
     finally:
+        _end(process)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a training, halted or not, even if whoever waits for that is interrupted once more."""
+    try:
         process.terminate()
-        process.send_signal(signal.SIGCONT)
-        try:
+        process.send_signal(signal.SIGCONT)  # one that is halted learns of no other signal
+        with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(_GRACE)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+    finally:
+        process.kill()  # takes a halted one as well, and none that has ended
+        process.wait()
 
 
 def _checkpoints(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -102,6 +103,7 @@ def test_the_command_prints_the_trainings_and_their_median_and_writes_them(
 ):
     def walked(_versions, _task, seeds, content) -> None:
         content |= {"definition": "minutes to a walk", "median_old_over_new": 1.5}
+        content["neither_walks"] = 2
         content["walking"] = [
             {"seed": seed, "version": "new", "minutes": None, "iteration": None} for seed in seeds
         ]
@@ -112,24 +114,63 @@ def test_the_command_prints_the_trainings_and_their_median_and_writes_them(
     printed = capsys.readouterr().out
     assert "minutes to a walk" in printed
     assert "old / new, median over seeds: 1.50" in printed
+    assert "seeds with which neither version walks, left out: 2" in printed
     content = json.loads(out.read_text())
     assert content["walking"][0]["seed"] == 3
     assert content["stopped"] is None
 
 
-def test_the_median_is_of_seeds_that_both_walked_with():
-    minutes = {
-        (0, "new"): 2.0,
-        (0, "old"): 3.0,
-        (1, "new"): 2.0,
-        (1, "old"): 4.0,
-        (2, "new"): None,
-        (2, "old"): 9.0,
-        (3, "old"): 9.0,
-    }
-    rows = [{"seed": s, "version": v, "minutes": m} for (s, v), m in minutes.items()]
-    assert benchmark_walking._median_ratio(rows) == 1.75
-    assert benchmark_walking._median_ratio(rows[4:]) is None
+@pytest.mark.parametrize(
+    ("old", "new", "median", "neither"),
+    [
+        ((3.0, 4.0), (2.0, 2.0), 1.75, 0),
+        ((3.0, 4.0, 9.0), (2.0, 2.0, None), 1.5, 0),  # of 1.5, 2 and 0: new never walks
+        ((3.0, 4.0, None), (2.0, 2.0, 2.0), 2.0, 0),  # of 1.5, 2 and never: old never walks
+        ((3.0, None), (2.0, 2.0), 1.5, 0),  # between 1.5 and never
+        ((None, None, 3.0), (2.0, 2.0, 2.0), "never", 0),
+        ((9.0, 9.0, 4.0), (None, None, 2.0), 0.0, 0),
+        ((3.0, None, None), (2.0, None, None), 1.5, 2),
+        ((None,), (None,), None, 1),
+    ],
+)
+def test_a_seed_with_which_a_version_never_walks_counts_against_it(old, new, median, neither):
+    rows = [
+        {"seed": seed, "version": version, "minutes": minutes}
+        for version, walks in (("old", old), ("new", new))
+        for seed, minutes in enumerate(walks)
+    ]
+    told = {"median_old_over_new": median, "neither_walks": neither}
+    assert benchmark_walking._compared(rows) == told
+
+
+def test_a_seed_that_only_one_version_has_trained_with_yet_compares_nothing():
+    rows = [{"seed": 0, "version": "old", "minutes": 9.0}]
+    told = {"median_old_over_new": None, "neither_walks": 0}
+    assert benchmark_walking._compared(rows) == told
+
+
+@pytest.mark.parametrize("interrupted_again", [None, "terminate", "send_signal", "wait"])
+def test_a_halted_training_ends_with_whoever_is_interrupted_however_often(
+    tmp_path, monkeypatch, interrupted_again
+):
+    checkout = _checkout(tmp_path / "new", 0)
+
+    def interrupt_measuring(*_: object) -> bool:
+        if interrupted_again is not None:
+            usual = getattr(subprocess.Popen, interrupted_again)
+
+            def interrupted(*arguments: object) -> None:
+                monkeypatch.setattr(subprocess.Popen, interrupted_again, usual)
+                usual(*arguments) if interrupted_again == "terminate" else None
+                raise KeyboardInterrupt
+
+            monkeypatch.setattr(subprocess.Popen, interrupted_again, interrupted)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(benchmark_walking, "_walks", interrupt_measuring)
+    with pytest.raises(KeyboardInterrupt):
+        time_to_walk([_version("new", checkout)], "go1_mute", [0], {})
+    assert not _is_there((checkout / "pid").read_text())
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="tells from /proc what is halted")
@@ -164,6 +205,8 @@ def test_a_program_that_fails_is_told_in_one_line(tmp_path, train, evaluate, tol
     with pytest.raises(MuteError) as caught:
         time_to_walk([_version("new", checkout)], "go1_mute", [0], {})
     assert str(caught.value) == told
+    if (checkout / "pid").exists():  # a training that was halted when its measurement failed
+        assert not _is_there((checkout / "pid").read_text())
 
 
 def test_a_version_without_a_checkout_is_refused(tmp_path):
