@@ -20,7 +20,7 @@ import dataclasses
 import json
 import random
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -62,6 +62,8 @@ _ACTION_STD = 0.3
 _FIRST_ACTION_STD = 1.0
 """Standard deviation of the actions at the beginning of a training."""
 _FIDELITY_ROBOTS, _FIDELITY_SECONDS = 8, 4.0
+_UNFINISHED = "not finished"
+"""What a file says while more is being measured, and for ever if the machine is switched off."""
 _SHAPES = ("foot", "trunk", "hip", "thigh", "shank")
 
 SpecEdit = Callable[[mujoco.MjSpec], None]
@@ -151,6 +153,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Raises:
         MuteError: If an argument is bad, or the policy cannot be used.
+        KeyboardInterrupt: If interrupted; what was measured before that has then been written and
+            printed.
     """
     argv = command_line() if argv is None else list(argv)
     args = parse(PhysicsBenchmarkArgs, argv, "Measure what parts of the physics cost.")
@@ -159,36 +163,52 @@ def main(argv: Sequence[str] | None = None) -> int:
     policy = load_policy(args.policy)
     if args.out is not None:
         make_directory(args.out.parent)
-    content = _measure(policy, args.num_envs, args.turns, quiet=args.json)
+    content: dict[str, Any] = {"task": policy.task, "machine": machine_kind()}
+    content |= {"mujoco": mujoco.__version__, "num_envs": args.num_envs, "stopped": _UNFINISHED}
+    content |= {"turns": 0, "rates": [], "fidelity": [], "touching": []}
+    try:
+        for _ in _measure(policy, args, content):
+            if args.out is not None:
+                write_json(args.out, content)
+    except KeyboardInterrupt:
+        content["stopped"] = "interrupted"
+        if content["touching"]:
+            _tell(args, content)
+        raise
+    content["stopped"] = None
+    _tell(args, content)
+    return 0
+
+
+def _tell(args: PhysicsBenchmarkArgs, content: Mapping[str, Any]) -> None:
+    """Write and print what was measured."""
     if args.out is not None:
         write_json(args.out, content)
     if args.json:
         print(json.dumps(content))
-        return 0
-    print_table(f"engine alone, {content['machine']}", content["rates"], list(content["rates"][0]))
-    for part in ("fidelity", "touching"):
-        print_table(part, content[part], list(content[part][0]))
-    return 0
+        return
+    titles = {"rates": f"engine alone, {content['machine']}"}
+    for part in ("rates", "fidelity", "touching"):
+        if content[part]:
+            print_table(titles.get(part, part), content[part], list(content[part][0]))
 
 
-def _measure(policy: Policy, num_envs: int, turns: int, quiet: bool) -> dict[str, Any]:
+def _measure(policy: Policy, args: PhysicsBenchmarkArgs, content: dict[str, Any]) -> Iterator[None]:
+    """Fill in what is measured, and yield whenever there is more of it."""
     use_collection_threads()
-    cfg = evaluation_cfg(policy.cfg.env, num_envs, 60.0, _SEED, randomized=True)
+    cfg = evaluation_cfg(policy.cfg.env, args.num_envs, 60.0, _SEED, randomized=True)
     rollout = _record(policy, cfg, _ACTION_STD)
     first = _record(None, cfg, _FIRST_ACTION_STD)
-    return {
-        "task": policy.task,
-        "machine": machine_kind(),
-        "mujoco": mujoco.__version__,
-        "num_envs": num_envs,
-        "turns": turns,
-        "rates": _rates(cfg, rollout, turns, quiet),
-        "fidelity": _fidelity(policy, quiet),
-        "touching": [
-            {"shape": name, "policy": rollout.touching[name], "beginning": first.touching[name]}
-            for name in _SHAPES
-        ],
-    }
+    content["touching"] = [
+        {"shape": name, "policy": rollout.touching[name], "beginning": first.touching[name]}
+        for name in _SHAPES
+    ]
+    yield
+    for content["turns"], content["rates"] in _rates(cfg, rollout, args.turns, args.json):
+        yield
+    for row in _fidelity(policy, args.json):
+        content["fidelity"].append(row)
+        yield
 
 
 @dataclass
@@ -241,7 +261,9 @@ def _touches(env: QuadrupedEnv, shape: str) -> torch.Tensor:
 
 def _rates(
     cfg: QuadrupedEnvCfg, rollout: _Rollout, turns: int, quiet: bool
-) -> list[dict[str, Any]]:
+) -> Iterator[tuple[int, list[dict[str, Any]]]]:
+    """Yield after each turn the number of turns so far, and a row for each variant."""
+    steps = cfg.num_envs * len(rollout.set_points)
     simulations = {variant: _simulation(variant, cfg) for variant in VARIANTS}
     times: dict[Variant, list[float]] = {variant: [] for variant in VARIANTS}
     order, shuffle = list(VARIANTS), random.Random(_SEED).shuffle
@@ -251,8 +273,10 @@ def _rates(
             seconds = _seconds(simulations[variant], variant.cfg(cfg).decimation, rollout)
             if turn > 0:  # the first one warms up
                 times[variant].append(seconds)
-    steps = cfg.num_envs * len(rollout.set_points)
-    return [_rate(variant.name, steps, times[variant], times[AS_IT_IS]) for variant in VARIANTS]
+        if turn > 0:
+            reference = times[AS_IT_IS]
+            rows = [_rate(each.name, steps, times[each], reference) for each in VARIANTS]
+            yield turn, rows
 
 
 def _rate(
@@ -293,22 +317,20 @@ def _seconds(simulation: Simulation, decimation: int, rollout: _Rollout) -> floa
     return time.perf_counter() - start
 
 
-def _fidelity(policy: Policy, quiet: bool) -> list[dict[str, Any]]:
-    """Return how far walks in each variant are from one in physics steps of 0.5 ms."""
+def _fidelity(policy: Policy, quiet: bool) -> Iterator[dict[str, Any]]:
+    """Yield how far walks in each variant are from one in physics steps of 0.5 ms."""
     cfg = evaluation_cfg(policy.cfg.env, _FIDELITY_ROBOTS, _FIDELITY_SECONDS, _SEED)
     steps = round(cfg.step_dt / REFERENCE)
     finest = dataclasses.replace(
         cfg, scene=dataclasses.replace(cfg.scene, timestep=REFERENCE), decimation=steps
     )
     walked = [variant for variant in VARIANTS if variant.spec is None and not variant.pictured]
-    rows = []
     for beta in (0.0, 1.0):
         reference = walk_figures(policy, finest, beta)
         for variant in walked if quiet else track(walked, f"walks at beta {beta:g}"):
             figures = walk_figures(policy, variant.cfg(cfg), beta)
             off = {name: value / reference[name] - 1.0 for name, value in figures.items()}
-            rows.append({"variant": variant.name, "beta": beta, **off})
-    return rows
+            yield {"variant": variant.name, "beta": beta, **off}
 
 
 if __name__ == "__main__":

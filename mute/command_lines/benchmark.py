@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import json
 import math
 import os
@@ -53,7 +54,13 @@ from mute.command_lines.benchmark_figures import (
     widest,
     with_interval,
 )
-from mute.command_lines.benchmark_peers import PEER_COLUMNS, peer_names, peer_pythons, time_peers
+from mute.command_lines.benchmark_peers import (
+    PEER_COLUMNS,
+    PeerRate,
+    peer_names,
+    peer_pythons,
+    time_peers,
+)
 from mute.command_lines.benchmark_turns import (
     THIS,
     Block,
@@ -119,6 +126,9 @@ class BenchmarkArgs:
     """File to write the JSON to as well."""
 
 
+_UNFINISHED = "not finished"
+"""What a file says while more is being measured, and for ever if the machine is switched off."""
+
 _PEER_ROUNDS = 6
 """Rounds of a peer unless --rollouts says how many: the fewest that have an interval."""
 
@@ -139,18 +149,29 @@ def main(argv: Sequence[str] | None = None) -> int:
     content |= {"load_before": os.getloadavg()[0], "stopped": None}
     try:
         if args.until_walking:
-            time_to_walk(versions, args.task, args.seeds, content)
+            keep = functools.partial(_keep, args, content)
+            time_to_walk(versions, args.task, args.seeds, content, keep)
         else:
             content |= {"precision": args.precision, "parts": PARTS, "rates": [], "peers": []}
             _measure(args, versions, content)
-            content["peers"] = _peer_rows(args, peers)
+            _measure_peers(args, peers, content)
     except (KeyboardInterrupt, MuteError) as stop:
         content["stopped"] = str(stop) if isinstance(stop, MuteError) else "interrupted"
-        if content.get("rates") or content.get("walking"):
+        if _has_figures(content):
             _tell(args, content)
         raise
     _tell(args, content)
     return 0
+
+
+def _has_figures(content: Mapping[str, Any]) -> bool:
+    return any(content.get(name) for name in ("rates", "walking", "peers"))
+
+
+def _keep(args: BenchmarkArgs, content: Mapping[str, Any]) -> None:
+    """Write what was measured so far."""
+    if args.out is not None and _has_figures(content):
+        write_json(args.out, {**content, "stopped": _UNFINISHED})
 
 
 def _check(args: BenchmarkArgs) -> tuple[str, ...]:
@@ -206,6 +227,7 @@ def _measure(args: BenchmarkArgs, versions: Sequence[Version], content: dict[str
                 ready = blocks[0].ready
                 content["versions"] = {name: _versions(each) for name, each in ready.items()}
                 content["rates"].append(_row(num_envs, blocks, args.precision))
+                _keep(args, content)
 
 
 def _turns(blocks: Sequence[Block]) -> int:
@@ -271,9 +293,10 @@ def _turns_in_all(turns: int, width: float, args: BenchmarkArgs) -> int | None:
     return min(args.max_turns, max(turns, MIN_BLOCKS * args.block_turns, needed))
 
 
-def _peer_rows(args: BenchmarkArgs, peers: Sequence[str]) -> list[dict[str, Any]]:
+def _measure_peers(args: BenchmarkArgs, peers: Sequence[str], content: dict[str, Any]) -> None:
+    """Add a row for each peer and for MUTE beside them, anew after each of their rounds."""
     if not peers:
-        return []
+        return
     given = {
         "mjlab": args.mjlab_python,
         "mujoco_playground": args.playground_python,
@@ -281,9 +304,12 @@ def _peer_rows(args: BenchmarkArgs, peers: Sequence[str]) -> list[dict[str, Any]
     }
     pythons = peer_pythons(peers, args.peers_from, given)
     rounds, robots = args.rollouts or _PEER_ROUNDS, min(args.num_envs)
-    return [
-        dataclasses.asdict(rate) for rate in time_peers(peers, pythons, robots, rounds, args.task)
-    ]
+
+    def keep(rates: Sequence[PeerRate]) -> None:
+        content["peers"] = [dataclasses.asdict(rate) for rate in rates]
+        _keep(args, content)
+
+    keep(time_peers(peers, pythons, robots, rounds, args.task, after_round=keep))
 
 
 def _tell(args: BenchmarkArgs, content: Mapping[str, Any]) -> None:

@@ -20,7 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +50,11 @@ _GRACE = 30.0
 
 
 def time_to_walk(
-    versions: Sequence[Version], task: str, seeds: Sequence[int], content: dict[str, Any]
+    versions: Sequence[Version],
+    task: str,
+    seeds: Sequence[int],
+    content: dict[str, Any],
+    keep: Callable[[], None] = lambda: None,
 ) -> None:
     """Run trainings until each walks, and add what comes of it to `content` as it comes.
 
@@ -60,6 +64,7 @@ def time_to_walk(
         seeds: Of the trainings.
         content: Gets `definition`, `walking`, a row for each training, and what `_compared` says
             of them.
+        keep: Called after each training, for `content` to be kept.
 
     Raises:
         MuteError: If a version has no checkout, or a training or a measurement fails.
@@ -76,6 +81,7 @@ def time_to_walk(
             print(f"seed {seed}, {version.name} version", file=sys.stderr)
             rows.append({"seed": seed, "version": version.name, **_walk(version, task, seed)})
             content |= _compared(rows)
+            keep()
 
 
 def _compared(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:

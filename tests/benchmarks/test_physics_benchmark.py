@@ -25,6 +25,7 @@ def test_it_compares_every_variant_with_the_scene_as_it_is(capsys, tmp_path, mon
     assert benchmark.main(arguments) == 0
     content = json.loads(capsys.readouterr().out)
     assert json.loads(out.read_text()) == content
+    assert (content["stopped"], content["turns"]) == (None, 6)
     rates = {row["variant"]: row for row in content["rates"]}
     assert list(rates) == [variant.name for variant in benchmark.VARIANTS]
     reference = rates.pop("as it is")
@@ -61,6 +62,32 @@ def test_every_variant_is_compiled_to_another_one_than_the_scene_as_it_is():
     assert as_it_is == _compiled(same)  # an edit that edits nothing is found
     compiled = {variant.name: _compiled(variant) for variant in benchmark.VARIANTS}
     assert len(set(compiled.values())) == len(compiled)
+
+
+def test_turns_before_a_stop_are_kept_and_the_file_says_that_it_was_cut_short(
+    capsys, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(benchmark, "_WARM_UP", 1)
+    monkeypatch.setattr(benchmark, "_STEPS", 1)
+    out = tmp_path / "physics.json"
+    usual, calls, unfinished = benchmark._seconds, [], []
+
+    def interrupted(*arguments) -> float:
+        calls.append(arguments)
+        if len(calls) > 3 * len(benchmark.VARIANTS):  # in the turn after the second that counts
+            unfinished.append(json.loads(out.read_text()))
+            raise KeyboardInterrupt
+        return usual(*arguments)
+
+    monkeypatch.setattr(benchmark, "_seconds", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        benchmark.main(["--num-envs", "2", "--turns", "6", "--json", "--out", str(out)])
+    content = json.loads(out.read_text())
+    assert (content["stopped"], content["turns"]) == ("interrupted", 2)
+    assert len(content["rates"]) == len(benchmark.VARIANTS)
+    assert (content["fidelity"], len(content["touching"])) == ([], 5)
+    assert json.loads(capsys.readouterr().out) == content
+    assert unfinished == [content | {"stopped": "not finished"}]
 
 
 @pytest.mark.parametrize("option", ["--num-envs", "--turns"])

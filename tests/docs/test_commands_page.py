@@ -18,8 +18,8 @@ from places import REPOSITORY
 
 _PAGE = (REPOSITORY / "docs" / "commands.md").read_text()
 _PAGES = sorted([*REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").glob("*.md")])
-_OF_THE_TREE = ".ci/check_wheel.py"
-"""What is run from the checkout and is no command of MUTE's."""
+_NOT_OURS = (".ci/check_wheel.py", "-m venv ")
+"""What is run from the checkout, or is Python's own, and is no command of MUTE's."""
 _OF_THE_BENCHMARK = "-m mute.command_lines.benchmark_worker"
 """What another command starts, by its path, and nobody else."""
 _MODULES = {
@@ -34,6 +34,7 @@ _MODULES = {
     "-m mute.card": "mute.command_lines.card",
     "-m benchmarks.make_peers": "benchmarks.make_peers",
     "-m benchmarks.peer_walks": "benchmarks.peer_walks",
+    "-m benchmarks.physics": "benchmarks.physics",
     "-m benchmarks.sound": "benchmarks.sound",
     "examples/run_onnx.py": "run_onnx",
     "examples/side_by_side.py": "side_by_side",
@@ -101,7 +102,7 @@ def test_a_command_that_any_page_gives_is_there_with_its_options(page):
         known = [
             command for command in _sections() if words[: len(command.split())] == command.split()
         ]
-        assert known or words[0] == _OF_THE_TREE, " ".join(words)
+        assert known or f"{' '.join(words)} ".startswith(_NOT_OURS), " ".join(words)
         if known:
             given = {word.split("=")[0] for word in words if word.startswith("--")} - {"--help"}
             assert given <= _offered(known[0]), " ".join(words)
@@ -124,6 +125,13 @@ def test_the_page_has_every_module_that_can_be_run():
     named = {" ".join(command.split()[:2]) for command in _sections()}
     assert modules - {_OF_THE_BENCHMARK} <= named
     assert scripts <= {command.split()[0] for command in named}
+
+
+def test_the_page_has_every_option_of_the_script_for_a_gpu():
+    section = _PAGE.partition("## `benchmarks/gpu.sh`")[2].partition("\n## ")[0]
+    script = (REPOSITORY / "benchmarks" / "gpu.sh").read_text()
+    offered = set(re.findall(r"^ {8}(--[^)\n]*)\)", script, re.MULTILINE))
+    assert set(re.findall(r"`(--[a-z-]+)`", section)) == set(re.split(r" \| ", " | ".join(offered)))
 
 
 def test_the_page_has_every_subcommand_of_evaluate():

@@ -18,6 +18,7 @@ from mute import tasks
 from mute.command_lines import benchmark
 from mute.command_lines.arguments import parse
 from mute.command_lines.benchmark_figures import figures_of, ratios, shortfall
+from mute.command_lines.benchmark_peers import PeerRate
 from mute.command_lines.benchmark_turns import Block, Times, times_of
 from mute.envs.quadruped_env import NUM_ACTIONS
 from mute.envs.scene import STAND_JOINT_POS, build_scene
@@ -247,6 +248,34 @@ def test_what_was_measured_before_a_stop_is_written_and_printed(
     assert [(row["num_envs"], row["turns"]) for row in content["rates"]] == [(4, 3), (8, 3)]
     assert [row["loop"] for row in content["rates"]] == [24.0, 24.0]
     assert "8 environments, medians of 1 blocks" in capsys.readouterr().out
+
+
+def test_rounds_of_peers_before_a_stop_are_written_as_they_come(tmp_path, monkeypatch, capsys):
+    out = tmp_path / "rates.json"
+    unfinished = []
+
+    def blocks(*_: object):
+        yield _constructed([[2.0]])
+
+    def peers(*_: object, after_round) -> None:
+        for rounds in (1, 2):
+            after_round(
+                [PeerRate("mute", environment=100.0 * rounds, rounds={"environment": rounds})]
+            )
+            unfinished.append(json.loads(out.read_text()))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(benchmark, "take_blocks", blocks)
+    monkeypatch.setattr(benchmark, "time_peers", peers)
+    argv = ["--num-envs", "4", "--rollouts", "1", "--peers", "gymnasium", "--out", str(out)]
+    with pytest.raises(KeyboardInterrupt):
+        benchmark.main(argv)
+    assert [file["stopped"] for file in unfinished] == ["not finished"] * 2
+    assert [file["peers"][0]["environment"] for file in unfinished] == [100.0, 200.0]
+    content = json.loads(out.read_text())
+    assert content["stopped"] == "interrupted"
+    assert content["peers"][0]["environment"] == 200.0
+    assert "peers, control steps/s" in capsys.readouterr().out
 
 
 def test_nothing_is_written_over_a_file_when_nothing_was_measured(tmp_path, monkeypatch):

@@ -101,7 +101,7 @@ def test_versions_walk_in_turns_and_the_median_over_seeds_compares_them(tmp_path
 def test_the_command_prints_the_trainings_and_their_median_and_writes_them(
     tmp_path, monkeypatch, capsys
 ):
-    def walked(_versions, _task, seeds, content) -> None:
+    def walked(_versions, _task, seeds, content, _keep) -> None:
         content |= {"definition": "minutes to a walk", "median_old_over_new": 1.5}
         content["neither_walks"] = 2
         content["walking"] = [
@@ -213,3 +213,14 @@ def test_a_version_without_a_checkout_is_refused(tmp_path):
     for version in (Version("old", sys.executable, None), _version("old", tmp_path)):
         with pytest.raises(MuteError, match="needs a checkout of the old version"):
             time_to_walk([version], "go1_mute", [0], {})
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="tells from /proc what is halted")
+def test_every_training_is_kept_as_it_ends(tmp_path):
+    version = _version("new", _checkout(tmp_path / "new", walks_at=0))
+    content: dict = {}
+    kept: list[int] = []
+    time_to_walk(
+        [version], "go1_mute", [0, 1], content, lambda: kept.append(len(content["walking"]))
+    )
+    assert kept == [1, 2]

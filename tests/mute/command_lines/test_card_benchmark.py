@@ -146,3 +146,9 @@ def test_what_the_physics_costs_stands_beside_what_it_changes():
         "under that policy foot 100.0%; under random actions, as a training begins, foot 25.0%."
         in page
     )
+
+
+def test_a_file_of_the_physics_that_was_cut_short_says_so(monkeypatch):
+    assert "cut short" not in _page(_measured())
+    monkeypatch.setitem(_PHYSICS, "stopped", "interrupted")
+    assert "The run was cut short: interrupted." in _page(_measured())
