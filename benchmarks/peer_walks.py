@@ -1,11 +1,13 @@
 """Find when peers' own policies walk: python -m benchmarks.peer_walks --peers-from DIR.
 
 One peer after the other trains in its own loop, with its own task's rewards. Every few minutes of
-training what it has learnt walks, by its own task's commands on its own robot, without noise on its
-actions; whether that is a walk is decided as for MUTE: error below 0.05 (m/s)^2, falls below 1 %. A
-peer ends with its first walk, or when its minutes are over: then the row says how far it came, and
-nothing is extrapolated. Minutes are those of training alone, without what is compiled before the
-first iteration ends. For MUTE itself, `evaluate.py progress` tells the same.
+training what it has learnt walks, by its own task's commands on its own robot, nominal and without
+noise on its actions or on what it sees; whether that is a walk is decided as for MUTE: error below
+0.05 (m/s)^2, falls below 1 %. A peer ends with its first walk, or when its minutes are over: then
+the row says how far it came, and nothing is extrapolated. Minutes are those of training alone,
+without what is compiled before the first iteration ends. For MUTE itself, `evaluate.py progress`
+tells the same of checkpoints that are closer together: a peer may have walked as much earlier than
+told as its trials are apart, which the file says.
 """
 
 from __future__ import annotations
@@ -177,6 +179,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     content: dict[str, Any] = {
         "machine": machine_kind(),
         "limit_minutes": args.minutes,
+        "tried_every_minutes": args.every,
         "peers": [],
     }
     for name in names:
@@ -196,8 +199,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if args.json:
         print(json.dumps(without_nan(content)))
     elif names:
-        shown = [{k: "-" if v is None else v for k, v in row.items()} for row in content["peers"]]
-        print_table("peers", shown, _COLUMNS)
+        title = f"peers, tried every {args.every:g} min: one may have walked that much earlier"
+        print_table(title, content["peers"], _COLUMNS)
     return 0
 
 

@@ -46,7 +46,7 @@ def make(num_envs: int, _task: str, device: str = "cpu") -> Parts:
             torch.cuda.synchronize()
 
     def walk_some(trials: int, seconds: float) -> tuple[float, float]:
-        trial = _environment(registry, trials, device, fixed_commands=True)[1]
+        trial = _environment(registry, trials, device, trial=True)[1]
         wrapped_trial = rl.RslRlVecEnvWrapper(trial, clip_actions=agent.clip_actions)
         figures = walk(runner, wrapped_trial, round(seconds / trial.step_dt), trial.step_dt, _read)
         trial.close()
@@ -68,16 +68,22 @@ def _environment(
     registry: Any,  # noqa: ANN401 -- not installed here
     num_envs: int,
     device: str,
-    fixed_commands: bool = False,
+    trial: bool = False,
 ) -> tuple[Any, Any]:
-    """Return the configuration of the task and an environment of it."""
+    """Return the configuration of the task and an environment of it.
+
+    Robots of a trial are nominal and see without noise, as MUTE's; the task's own configuration for
+    playing has other commands as well.
+    """
     envs: Any = importlib.import_module("mjlab.envs")
     cfg = registry.load_env_cfg(_TASK)
     cfg.scene.num_envs = num_envs
     cfg.seed = 0
-    if fixed_commands:
+    if trial:
         cfg.commands[_COMMAND].resampling_time_range = _FOREVER
-        cfg.events.pop("push_robot")  # MUTE's trials have no pushes
+        cfg.observations["actor"].enable_corruption = False
+        # Those of other modes push robots, or make them differ.
+        cfg.events = {name: event for name, event in cfg.events.items() if event.mode == "reset"}
     env = envs.ManagerBasedRlEnv(cfg, device=device)
     env.reset()
     return cfg, env

@@ -18,7 +18,8 @@ from mute.learning.runner import MuteRunner
 from mute.support.memory import keep_freed_memory
 from mute.support.plugins import load_plugins
 from mute.tasks import make_task
-from peers.parts import ACTION_SETS, TARGET_NOISE, Facts, Parts, timed_loop
+from peers.parts import ACTION_SETS, TARGET_NOISE, Facts, Parts
+from peers.rsl_rl_walk import training_loop
 
 __all__ = ["make"]
 
@@ -46,12 +47,6 @@ def make(num_envs: int, task: str, device: str = "cpu") -> Parts:
         if device != "cpu":
             torch.cuda.synchronize()
 
-    first = itertools.count()
-
-    def iteration() -> None:
-        runner.learn(1, init_at_random_ep_len=next(first) == 0)
-        runner.current_learning_iteration += 1  # rsl_rl counts from the last one again
-
     facts = Facts(
         engine=_engine(device),
         robot="Unitree Go1",
@@ -61,7 +56,7 @@ def make(num_envs: int, task: str, device: str = "cpu") -> Parts:
         decimation=cfg.env.decimation,
         note="MUTE itself, with estimator and randomised robots",
     )
-    return Parts(facts, step, timed_loop(iteration, num_envs * cfg.agent.num_steps_per_env))
+    return Parts(facts, step, training_loop(runner, num_envs))
 
 
 def _engine(device: str) -> str:

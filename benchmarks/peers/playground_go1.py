@@ -38,7 +38,8 @@ def make(num_envs: int, _task: str) -> Parts:
     jax: Any = importlib.import_module("jax")
     playground: Any = importlib.import_module("mujoco_playground")
     # The default implementation is Warp's, which needs a GPU here.
-    bare = playground.registry.load(_TASK, config_overrides={"impl": "jax"})
+    overrides: dict[str, Any] = {"impl": "jax"}
+    bare = playground.registry.load(_TASK, config_overrides=overrides)
     env = playground.wrapper.wrap_for_brax_training(bare)
     advance = jax.jit(env.step)
     # Its wrappers take keys as arrays of numbers only.
@@ -52,7 +53,10 @@ def make(num_envs: int, _task: str) -> Parts:
         nonlocal state
         state = jax.block_until_ready(advance(state, next(actions)))
 
-    training = _Training(playground, bare, num_envs)
+    # As in MUTE's trials what robots see has no noise; without a randomizer they are nominal.
+    overrides["noise_config.level"] = 0.0
+    trial = playground.registry.load(_TASK, config_overrides=overrides)
+    training = _Training(playground, bare, trial, num_envs)
     facts = Facts(
         engine=f"mujoco-mjx {metadata.version('mujoco-mjx')} (jax on the CPU)",
         robot="Unitree Go1",
@@ -68,8 +72,9 @@ def make(num_envs: int, _task: str) -> Parts:
 class _Training:
     """Brax's training, which is one call: it runs in a thread and waits after each iteration."""
 
-    def __init__(self, playground: Any, env: Any, num_envs: int) -> None:  # noqa: ANN401
-        self._playground, self._env, self._num_envs = playground, env, num_envs
+    def __init__(self, playground: Any, env: Any, trial: Any, num_envs: int) -> None:  # noqa: ANN401
+        self._playground, self._env, self._trial = playground, env, trial
+        self._num_envs = num_envs
         self._asked: queue.Queue[None] = queue.Queue()
         self._done: queue.Queue[tuple[int, float] | Exception] = queue.Queue()
         self._thread: threading.Thread | None = None
@@ -133,19 +138,19 @@ class _Training:
         if self._policy is None:
             raise RuntimeError("nothing has been learnt yet")
         jax: Any = importlib.import_module("jax")
-        env = self._playground.wrapper.wrap_for_brax_training(self._env)
+        env = self._playground.wrapper.wrap_for_brax_training(self._trial)
         key = jax.random.PRNGKey(1)
         state = jax.jit(env.reset)(jax.random.split(key, trials))
         state.info["steps_until_next_cmd"] = jax.numpy.full(trials, _NEVER)
-        policy, velocity_of = self._policy, jax.vmap(self._env.get_local_linvel)
+        policy, velocity_of = self._policy, jax.vmap(self._trial.get_local_linvel)
 
         @jax.jit
         def advance(state: Any) -> tuple[Any, Any]:  # noqa: ANN401
             state = env.step(state, policy(state.obs, key)[0])
             return state, velocity_of(state.data)
 
-        meter = WalkMeter(trials, self._env.dt)
-        for _ in range(round(seconds / self._env.dt)):
+        meter = WalkMeter(trials, self._trial.dt)
+        for _ in range(round(seconds / self._trial.dt)):
             command = np.asarray(state.info["command"])
             state, velocity = advance(state)
             # Trials are shorter than episodes, so what ends one is a fall.

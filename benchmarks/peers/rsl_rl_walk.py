@@ -1,4 +1,4 @@
-"""What mjlab and UniLab share: both are trained by rsl_rl."""
+"""What MUTE, mjlab and UniLab share: all are trained by rsl_rl."""
 
 from __future__ import annotations
 

@@ -23,6 +23,9 @@ __all__ = ["make"]
 _TASK = "go2_joystick_flat/mujoco"
 _COMMAND = "twist"
 
+_NOMINAL = ("~env.events.pd_gains",)
+"""What makes robots of a trial nominal, as MUTE's; the task adds nothing to what they see."""
+
 
 def make(num_envs: int, _task: str) -> Parts:
     """Return the task and its training."""
@@ -44,7 +47,8 @@ def make(num_envs: int, _task: str) -> Parts:
         wrapped.step(next(actions))
 
     def walk_some(trials: int, seconds: float) -> tuple[float, float]:
-        trial = rl.RslRlVecEnvAdapter(_environment(cfg, trials), device="cpu")
+        nominal = _settings(trials, *_NOMINAL)
+        trial = rl.RslRlVecEnvAdapter(_environment(nominal, trials), device="cpu")
         figures = walk(runner, trial, round(seconds / env.cfg.ctrl_dt), env.cfg.ctrl_dt, _read)
         trial.close()
         return figures
@@ -61,7 +65,7 @@ def make(num_envs: int, _task: str) -> Parts:
     return Parts(facts, step, training_loop(runner, num_envs), walk_some)
 
 
-def _settings(num_envs: int) -> Any:  # noqa: ANN401 -- not installed here
+def _settings(num_envs: int, *more: str) -> Any:  # noqa: ANN401 -- not installed here
     hydra: Any = importlib.import_module("hydra")
     root = Path(importlib.import_module("unilab").__file__ or "").parent
     with hydra.initialize_config_dir(str(root / "conf" / "ppo"), version_base="1.3"):
@@ -73,6 +77,7 @@ def _settings(num_envs: int) -> Any:  # noqa: ANN401 -- not installed here
                 f"env.scene.model_file={root / 'assets/robots/go2/scene_flat.xml'}",
                 "training.device=cpu",
                 "training.logger=none",
+                *more,
             ],
         )
 

@@ -320,7 +320,7 @@ def _tell(args: BenchmarkArgs, content: Mapping[str, Any]) -> None:
         print(json.dumps(content))
         return
     if args.until_walking:
-        shown = [{k: "-" if v is None else v for k, v in row.items()} for row in content["walking"]]
+        shown = content["walking"]
         print_table(f"{content['definition']}; {content['machine']}", shown, list(shown[0]))
         print("".join(_told_of_walks(content)), end="")
         return
@@ -332,8 +332,7 @@ def _tell(args: BenchmarkArgs, content: Mapping[str, Any]) -> None:
         if row["not_precise"]:
             print(f"{row['num_envs']} environments: {row['not_precise']}", file=sys.stderr)
     if content["peers"]:
-        shown = [{k: "-" if v is None else v for k, v in row.items()} for row in content["peers"]]
-        print_table("peers, control steps/s", shown, list(PEER_COLUMNS))
+        print_table("peers, control steps/s", content["peers"], list(PEER_COLUMNS))
 
 
 def _told_of_walks(content: Mapping[str, Any]) -> Iterator[str]:

@@ -64,4 +64,6 @@ def read_json(path: Path) -> Any:  # noqa: ANN401
 
 
 def _shown(value: Any) -> str:  # noqa: ANN401
+    if value is None:
+        return "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -95,6 +95,7 @@ def test_a_peer_that_does_not_start_is_told_and_the_others_go_on(tmp_path, capsy
     assert peer_walks.main(argv) == 0
     content = json.loads(capsys.readouterr().out)
     assert json.loads(out.read_text()) == content
+    assert (content["limit_minutes"], content["tried_every_minutes"]) == (30.0, 5.0)
     mjlab, unilab = content["peers"]
     assert mjlab["note"].startswith(f"{tmp_path}/mjlab/bin/python does not start: ")
     assert (unilab["name"], unilab["walks"], unilab["trials"]) == ("unilab", None, [])
