@@ -177,7 +177,8 @@ def _peers(files: BenchmarkFiles) -> str:
             "the environment alone, and their own training loops, all of an iteration, without "
             "what is compiled before. Medians over rounds, in brackets the 95 % interval where "
             "there are six or more. mjlab, MuJoCo Playground and UniLab have robots and tasks of "
-            "their own.",
+            "their own. The engines of mjlab and MuJoCo Playground, Warp and MJX, are meant for "
+            "GPUs, and the batches and epochs of the peers' trainings for other numbers of robots.",
             *tables,
         )
     )
