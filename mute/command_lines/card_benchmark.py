@@ -57,7 +57,9 @@ _INTERVALS = (
 _OF_TURNS = (
     "Each figure is the median over turns of one pair of processes, and in brackets stands the "
     "interval that would hold the true one at 95 % if turns were independent. They depend on each "
-    "other, and other processes may run at another speed, so it is too narrow."
+    "other, and other processes may run at another speed, so it is too narrow. Each version's "
+    "engine does its own training's rollout again, the new one without recording what the old one "
+    "records."
 )
 """What is said of a file from before there were blocks."""
 
