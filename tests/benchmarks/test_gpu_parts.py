@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import fcntl
 import json
 import math
@@ -11,6 +10,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -67,10 +67,15 @@ def _holding(held: Path, holds: Path) -> str:
 
 
 def _is_free(held: Path) -> bool:
-    with held.open("r+") as file, contextlib.suppress(BlockingIOError):
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        return True
-    return False
+    """Tell whether a file is unlocked, or soon will be: a killed child takes its time to be gone.
+
+    However slow the machine is, only a child that goes on is waited for in vain.
+    """
+    with held.open("r+") as file:
+        waiting = threading.Thread(target=fcntl.flock, args=(file, fcntl.LOCK_EX), daemon=True)
+        waiting.start()
+        waiting.join(60.0)
+        return not waiting.is_alive()
 
 
 class _Clock:
