@@ -115,7 +115,7 @@ class BatchSimulation:
     def state_dict(self) -> dict[str, torch.Tensor]:
         """Return all that is needed to continue bit for bit."""
         state = saved_fields(self._fields)
-        state["mujoco"] = torch.tensor(_VERSION)
+        state["mujoco"] = torch.tensor(_VERSION, device=self.device)
         state["integration"] = torch.from_numpy(self._state.copy())
         # What was written since the last call reaches the engine's own state in the next one only.
         return state | {name: torch.from_numpy(self._shown[name].copy()) for name in _WRITTEN}
