@@ -156,27 +156,24 @@ class _Camera(contextlib.AbstractContextManager["_Camera"]):
     def __init__(self, env: QuadrupedEnv) -> None:
         import mujoco
 
-        from mute.envs.scene import build_scene
+        from mute.envs.picture import Picture
 
-        self._model = build_scene(env.cfg.scene)
-        pixels = self._model.texture("floor").data.reshape(-1, 3)
+        self._picture = Picture(env)
+        pixels = self._picture.model.texture("floor").data.reshape(-1, 3)
         pixels[:] = np.clip(pixels * _WOOD, 0, 255)
         self._env = env
-        self._data = mujoco.MjData(self._model)
         self._view = mujoco.MjvCamera()
         self._view.azimuth, self._view.elevation, self._view.distance = 74.0, -10.0, 1.05
         width, height = _PICTURE
-        self._renderer = mujoco.Renderer(self._model, height, width)
+        self._renderer = mujoco.Renderer(self._picture.model, height, width)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
 
     def picture(self) -> np.ndarray:
         """Return the robot as it stands now. Shape: (height, width, 3), uint8."""
-        import mujoco
-
-        self._data.qpos[:] = self._env.simulation.qpos[0].numpy()
-        mujoco.mj_forward(self._model, self._data)
-        self._view.lookat[:] = (*self._data.qpos[:2], _LOOK_AT_HEIGHT)
-        self._renderer.update_scene(self._data, self._view)
+        self._picture.show(self._env.simulation.qpos[0])
+        data = self._picture.data
+        self._view.lookat[:] = (*data.qpos[:2], _LOOK_AT_HEIGHT)
+        self._renderer.update_scene(data, self._view)
         return self._renderer.render().copy()
 
     def __exit__(self, *error: object) -> None:

@@ -65,7 +65,7 @@ def test_an_estimate_is_what_each_head_says_of_the_hidden_state():
     close(estimate.phase, phase)
 
 
-def test_unrolling_a_sequence_agrees_with_stepping_through_it():
+def _check_that_unrolling_is_stepping() -> None:
     estimator = _make_estimator()
     obs, state, starts = _make_sequence()
     unrolled, last = estimator.unroll(obs, state, starts)
@@ -74,6 +74,10 @@ def test_unrolling_a_sequence_agrees_with_stepping_through_it():
         for stepped, sequence in zip(estimate, unrolled, strict=True):
             torch.testing.assert_close(stepped, sequence[t], atol=1e-6, rtol=0)
     torch.testing.assert_close(state, last, atol=1e-6, rtol=0)
+
+
+def test_unrolling_a_sequence_agrees_with_stepping_through_it():
+    _check_that_unrolling_is_stepping()
 
 
 def test_an_environment_that_starts_forgets_what_came_before():
@@ -299,11 +303,4 @@ def test_in_bfloat16_the_state_stays_float32_and_all_is_as_before_within_its_rou
 
 def test_in_bfloat16_unrolling_a_sequence_agrees_with_stepping_through_it(monkeypatch):
     use_bfloat16(monkeypatch)
-    estimator = _make_estimator()
-    obs, state, starts = _make_sequence()
-    unrolled, last = estimator.unroll(obs, state, starts)
-    for t in range(NUM_STEPS):
-        estimate, state = estimator.step(obs[t], state)
-        for stepped, sequence in zip(estimate, unrolled, strict=True):
-            torch.testing.assert_close(stepped, sequence[t], atol=1e-6, rtol=0)
-    torch.testing.assert_close(state, last, atol=1e-6, rtol=0)
+    _check_that_unrolling_is_stepping()
