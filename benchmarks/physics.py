@@ -64,7 +64,7 @@ _FIRST_ACTION_STD = 1.0
 _FIDELITY_ROBOTS, _FIDELITY_SECONDS = 8, 4.0
 _UNFINISHED = "not finished"
 """What a file says while more is being measured, and for ever if the machine is switched off."""
-_SHAPES = ("foot", "trunk", "hip", "thigh", "shank")
+_SHAPES = ("foot", "trunk", "thigh", "shank")
 
 SpecEdit = Callable[[mujoco.MjSpec], None]
 CfgEdit = Callable[[QuadrupedEnvCfg], QuadrupedEnvCfg]
@@ -111,8 +111,30 @@ def _with(disabled: mujoco.mjtDisableBit) -> SpecEdit:
 
 def _only_feet_collide(spec: mujoco.MjSpec) -> None:
     for geom in spec.geoms:
-        if geom.name.split("_")[-1] in ("hip", "thigh", "shank"):
+        if geom.name.split("_")[-1] in ("thigh", "shank"):
             geom.contype = geom.conaffinity = 0
+
+
+def _hips_collide(spec: mujoco.MjSpec) -> None:
+    """Give each hip the capsule that published models have, and its contact sensor."""
+    for leg in LEGS:
+        sideways = 0.02 if leg.endswith("L") else -0.02
+        name = f"{leg}_hip_motor"
+        spec.body(f"{leg}_hip").add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            size=(0.05, 0.0, 0.0),
+            fromto=(0.0, sideways, 0.0, 0.0, 2.0 * sideways, 0.0),
+            contype=0,
+            conaffinity=1,
+        )
+        spec.add_sensor(
+            name=f"{name}_contact",
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_GEOM,
+            objname=name,
+            intprm=(1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1),
+        )
 
 
 AS_IT_IS = Variant("as it is")
@@ -120,7 +142,8 @@ VARIANTS = (
     AS_IT_IS,
     Variant("with the shapes that are only to be seen", pictured=True),
     Variant("with a search for islands", spec=_with(mujoco.mjtDisableBit.mjDSBL_ISLAND)),
-    Variant("hips, thighs and shanks touch nothing", spec=_only_feet_collide),
+    Variant("hips touch the ground as well", spec=_hips_collide),
+    Variant("thighs and shanks touch nothing", spec=_only_feet_collide),
     Variant("without dry friction in the joints", cfg=_without_dry_friction),
     Variant("at most 5 solver iterations", cfg=_scene(iterations=5)),
     Variant("at most 3 solver iterations", cfg=_scene(iterations=3)),

@@ -335,7 +335,7 @@ def _add_foot_sensors(spec: mujoco.MjSpec) -> None:
 def _add_contact_sensors(spec: mujoco.MjSpec) -> None:
     """Add the number of contacts of every collision shape: feet, trunk, head, then leg by leg."""
     feet = [f"{leg}_foot" for leg in LEGS]
-    limbs = [f"{leg}_{part}" for leg in LEGS for part in ("hip", "thigh", "shank")]
+    limbs = [f"{leg}_{part}" for leg in LEGS for part in ("thigh", "shank")]
     for geom in (*feet, "trunk", "head", *limbs):
         spec.add_sensor(
             name=f"{geom}_contact",

@@ -10,8 +10,8 @@ from .simulation import Simulation
 
 __all__ = ["RobotSensors", "sensor_slice"]
 
-_NUM_SHAPES = 14
-"""Collision shapes other than feet: trunk, head, and hip, thigh and shank of each leg."""
+_NUM_SHAPES = 10
+"""Collision shapes other than feet: trunk, head, and thigh and shank of each leg."""
 _NUM_TRUNK_SHAPES = 2
 """The first two of them: trunk and head."""
 
@@ -42,7 +42,7 @@ class RobotSensors:
         self.trunk_contact = now("trunk_contact", _NUM_TRUNK_SHAPES)
         """Number of contacts of trunk and head. Shape: (num_envs, 2)."""
         self.shape_contact = now("trunk_contact", _NUM_SHAPES)
-        """Number of contacts of every collision shape but the feet. Shape: (num_envs, 14)."""
+        """Number of contacts of every collision shape but the feet. Shape: (num_envs, 10)."""
         simulation.record("sensordata")
         self._simulation = simulation
         self._foot_vel_z = sensor_slice(model, f"{LEGS[0]}_foot_vel", feet).start + 2

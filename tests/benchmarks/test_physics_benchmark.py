@@ -85,7 +85,7 @@ def test_turns_before_a_stop_are_kept_and_the_file_says_that_it_was_cut_short(
     content = json.loads(out.read_text())
     assert (content["stopped"], content["turns"]) == ("interrupted", 2)
     assert len(content["rates"]) == len(benchmark.VARIANTS)
-    assert (content["fidelity"], len(content["touching"])) == ([], 5)
+    assert (content["fidelity"], len(content["touching"])) == ([], 4)
     assert json.loads(capsys.readouterr().out) == content
     assert unfinished == [content | {"stopped": "not finished"}]
 
