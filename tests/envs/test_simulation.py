@@ -16,7 +16,7 @@ from mute.envs.sensors import sensor_slice
 from mute.envs.simulation import Engine
 
 MODEL = build_scene(SceneCfg())
-_ARENA = 40_000
+_ARENA = 38_000
 """Memory of a simulation, bytes."""
 
 LIVE = ("qpos", "qvel", "ctrl", "sensordata", "actuator_force")
