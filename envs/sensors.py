@@ -8,9 +8,9 @@ import torch
 from .scene import LEGS
 from .simulation import Simulation
 
-__all__ = ["RobotSensors", "sensor_slice"]
+__all__ = ["NUM_SHAPES", "RobotSensors", "sensor_slice"]
 
-_NUM_SHAPES = 10
+NUM_SHAPES = 10
 """Collision shapes other than feet: trunk, head, and thigh and shank of each leg."""
 _NUM_TRUNK_SHAPES = 2
 """The first two of them: trunk and head."""
@@ -41,7 +41,7 @@ class RobotSensors:
         """Number of contacts of each foot. Shape: (num_envs, 4)."""
         self.trunk_contact = now("trunk_contact", _NUM_TRUNK_SHAPES)
         """Number of contacts of trunk and head. Shape: (num_envs, 2)."""
-        self.shape_contact = now("trunk_contact", _NUM_SHAPES)
+        self.shape_contact = now("trunk_contact", NUM_SHAPES)
         """Number of contacts of every collision shape but the feet. Shape: (num_envs, 10)."""
         simulation.record("sensordata")
         self._simulation = simulation

@@ -20,7 +20,7 @@ from mute.checkpoint import CheckpointError
 from mute.controllers import LearnedController, load_policy
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.rewards import reward_term
-from mute.envs.sensors import sensor_slice
+from mute.envs.sensors import NUM_SHAPES, sensor_slice
 from mute.envs.warp_simulation import WarpSimulation
 from mute.evaluation.gait import GaitMeter
 from mute.evaluation.trials import evaluation_cfg
@@ -55,7 +55,7 @@ def _put_at_the_same(one, other):
 def _contacts(env):
     """Return what all contact sensors found at every physics step."""
     columns = sensor_slice(env.model, "FR_foot_contact", 4)
-    links = sensor_slice(env.model, "trunk_contact", 14)
+    links = sensor_slice(env.model, "trunk_contact", NUM_SHAPES)
     found = env.simulation.substeps["sensordata"].float()
     return torch.cat((found[:, :, columns], found[:, :, links]), dim=2).flatten(1)
 
