@@ -28,7 +28,19 @@ def load_fields(simulation: Simulation, state: Mapping[str, torch.Tensor]) -> No
     Args:
         simulation: The engine that they are written to.
         state: A `state_dict` of an engine of that kind.
+
+    Raises:
+        ValueError: If a field has another shape than in this model; none is written then.
     """
-    for key, value in state.items():
-        if key.startswith(_PREFIX):
-            simulation.field(key.removeprefix(_PREFIX)).copy_(value)
+    saved = {
+        key.removeprefix(_PREFIX): value for key, value in state.items() if key.startswith(_PREFIX)
+    }
+    for name, value in saved.items():
+        own = simulation.field(name)
+        if value.shape != own.shape:
+            raise ValueError(
+                f"simulation field {name!r} has shape {tuple(value.shape)}, this model needs "
+                f"{tuple(own.shape)}"
+            )
+    for name, value in saved.items():
+        simulation.field(name).copy_(value)

@@ -373,3 +373,21 @@ def test_positions_alone_make_the_sensors_of_positions_current():
     raised = simulation.sensordata[:, columns] - before
     assert (raised[0] == 0.0).all()
     torch.testing.assert_close(raised[1, 2::3], torch.full((4,), 0.25), atol=1e-6, rtol=0.0)
+
+
+def test_a_field_of_a_model_with_other_shapes_is_refused_and_nothing_is_written(make_standing):
+    simulation = make_standing()
+    simulation.field("body_mass")
+    friction = simulation.field("geom_friction")
+    own = tuple(friction.shape)
+    state = simulation.state_dict()
+    state["field/body_mass"] = state["field/body_mass"] + 1.0
+    state["field/geom_friction"] = torch.ones(2, MODEL.ngeom + 4, 3, dtype=friction.dtype)
+    before = simulation.field("body_mass").clone()
+    with pytest.raises(ValueError, match="geom_friction") as error:
+        simulation.load_state_dict(state)
+    assert str(error.value) == (
+        f"simulation field 'geom_friction' has shape (2, {MODEL.ngeom + 4}, 3), "
+        f"this model needs {own}"
+    )
+    assert torch.equal(simulation.field("body_mass"), before)
