@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from mujoco.batch import Batch, SimulationError
 
+from .engine_version import check_version, version_entry
 from .model_fields import load_fields, saved_fields
 from .simulation import MAX_SPEED, Stage
 
@@ -21,9 +22,6 @@ _WRITTEN = ("qpos", "qvel", "ctrl")
 
 _READ = ("sensordata", "actuator_force")
 """Arrays that follow from the state."""
-
-_VERSION = tuple(int(part) for part in mujoco.__version__.split(".")[:3])
-"""Version of MuJoCo, saved with a state."""
 
 _MANY_SHAPES = 8
 """Shapes of a body from which on it may pay to look first which of them are near."""
@@ -114,8 +112,7 @@ class BatchSimulation:
 
     def state_dict(self) -> dict[str, torch.Tensor]:
         """Return all that is needed to continue bit for bit."""
-        state = saved_fields(self._fields)
-        state["mujoco"] = torch.tensor(_VERSION, device=self.device)
+        state = saved_fields(self._fields) | version_entry(self.device)
         state["integration"] = torch.from_numpy(self._state.copy())
         # What was written since the last call reaches the engine's own state in the next one only.
         return state | {name: torch.from_numpy(self._shown[name].copy()) for name in _WRITTEN}
@@ -124,25 +121,15 @@ class BatchSimulation:
         """Continue from a `state_dict`.
 
         Raises:
-            ValueError: If the state belongs to another engine, another model or another number of
-                simulations.
+            ValueError: If the state belongs to another engine or version of MuJoCo, another model
+                or another number of simulations.
         """
         if "integration" not in state:
             raise ValueError(
                 "simulation state is not of the engine 'mujoco': go on with the engine and the"
                 " device that it was saved with"
             )
-        if "mujoco" not in state:
-            raise ValueError(
-                "simulation state is of the engine of an earlier version, whose trainings cannot go"
-                " on here; their policies play and export as before"
-            )
-        version = tuple(state["mujoco"].tolist())
-        if version[:2] != _VERSION[:2]:
-            raise ValueError(
-                f"simulation state is of MuJoCo {'.'.join(map(str, version))}, this is "
-                f"{mujoco.__version__}: go on with the version that it was saved with"
-            )
+        check_version(state)
         integration = state["integration"].numpy()
         if integration.shape != self._state.shape:
             raise ValueError(

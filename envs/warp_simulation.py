@@ -19,6 +19,7 @@ import mujoco
 import numpy as np
 import torch
 
+from .engine_version import check_version, version_entry
 from .model_fields import load_fields, saved_fields
 from .simulation import MAX_SPEED, Stage
 
@@ -137,22 +138,22 @@ class WarpSimulation:
 
     def state_dict(self) -> dict[str, torch.Tensor]:
         """Return all that is needed to continue, on the CPU bit for bit."""
-        return saved_fields(self._fields) | {
-            name: value.clone() for name, value in self._state.items()
-        }
+        own = {name: value.clone() for name, value in self._state.items()}
+        return saved_fields(self._fields) | version_entry(self.device) | own
 
     def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
         """Continue from a `state_dict`.
 
         Raises:
-            ValueError: If the state belongs to another engine, another model or another number of
-                simulations.
+            ValueError: If the state belongs to another engine or version of MuJoCo, another model
+                or another number of simulations.
         """
         if "qacc_warmstart" not in state:
             raise ValueError(
                 "simulation state is not of the engine 'warp': go on with the engine and the"
                 " device that it was saved with"
             )
+        check_version(state)
         for name, own in self._state.items():
             if state[name].shape != own.shape:
                 raise ValueError(

@@ -294,12 +294,29 @@ def test_what_was_written_since_the_last_call_is_part_of_a_saved_state():
         _assert_same(_tensors(twin, index), _tensors(simulation, index))
 
 
-def test_a_state_of_another_mujoco_is_refused():
-    simulation = _make_standing()
+def test_a_state_of_another_mujoco_is_refused(make_standing):
+    simulation = make_standing()
     state = simulation.state_dict()
     state["mujoco"] = torch.tensor([4, 7, 1])
     with pytest.raises(ValueError, match=r"MuJoCo 4\.7\.1, this is"):
         simulation.load_state_dict(state)
+
+
+def test_a_state_that_tells_no_version_of_mujoco_is_refused_as_an_earlier_ones(make_standing):
+    simulation = make_standing()
+    state = {name: value for name, value in simulation.state_dict().items() if name != "mujoco"}
+    with pytest.raises(ValueError, match="earlier version") as error:
+        simulation.load_state_dict(state)
+    assert "\n" not in str(error.value)
+
+
+def test_a_state_of_another_patch_of_this_mujoco_is_loaded(make_standing):
+    simulation = make_standing()
+    state = simulation.state_dict()
+    state["mujoco"][2] += 1
+    simulation.qpos[:, 2] += 0.5
+    simulation.load_state_dict(state)
+    assert torch.equal(simulation.qpos, state["qpos"])
 
 
 def test_a_saved_state_does_not_change_afterwards(make_standing):
