@@ -37,6 +37,9 @@ _STATE = (
 )
 """Arrays from which everything else follows, and readings that are older than they."""
 
+_FORWARDED = ("qacc_warmstart", "sensordata", "actuator_force", "overflow")
+"""Those of them that a forward pass may write."""
+
 _DERIVED = ("body_subtreemass", "body_invweight0", "dof_invweight0")
 """Model fields that follow from the masses, and differ between simulations when these do."""
 
@@ -101,12 +104,15 @@ class WarpSimulation:
 
     def forward(self, mask: torch.Tensor | None = None, stage: Stage = "all") -> None:
         """Recompute what follows from the state, at any stage all of it. Mask: (num_envs,)."""
-        readings = (self.sensordata, self.actuator_force)
-        before = [reading.clone() for reading in readings]
+        if mask is None:
+            self._run(self._engine.forward)
+            return
+        before = {name: self._state[name].clone() for name in _FORWARDED}
         self._run(self._engine.forward)
-        if mask is not None:
-            for reading, old in zip(readings, before, strict=True):
-                torch.where(mask.unsqueeze(1), reading, old, out=reading)
+        for name, old in before.items():
+            own = self._state[name]
+            inside = mask if own.ndim == 1 else mask.unsqueeze(1)
+            torch.where(inside, own, old, out=own)
 
     def reset(self, mask: torch.Tensor, keyframe: int = 0) -> None:
         """Put the masked simulations to a keyframe. Mask shape: (num_envs,)."""

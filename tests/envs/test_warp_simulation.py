@@ -90,6 +90,23 @@ def test_lost_contacts_make_a_simulation_unstable_and_a_solver_at_its_limit_does
     assert not simulation.unstable().any()
 
 
+def test_forward_of_a_mask_leaves_all_that_the_others_continue_from_as_it_is():
+    # At its limit of one iteration the solver of a forward pass raises a flag of every simulation.
+    model = build_scene(SceneCfg())
+    model.opt.iterations = 1
+    simulation, twin = (WarpSimulation(model, 2) for _ in range(2))
+    for each in (simulation, twin):
+        each.reset(torch.ones(2, dtype=torch.bool))
+        each.qvel[:, 2] = -1.0
+    simulation.forward(torch.tensor([True, False]))
+    assert simulation._state["overflow"][0] != 0
+    for num_steps in (0, 5):
+        for each in (simulation, twin):
+            each.step(num_steps)
+        for name, own in simulation._state.items():
+            assert torch.equal(own[1], twin._state[name][1]), (num_steps, name)
+
+
 def test_no_posture_has_more_contacts_than_there_is_room_for():
     num_envs = 64
     simulation = _make_standing(num_envs)
