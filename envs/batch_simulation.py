@@ -78,7 +78,12 @@ class BatchSimulation:
         self._make_room(num_steps)
         with self._calling():
             # Unlike `Batch.step`, a rollout ends for a simulation that MuJoCo warns of.
-            self._batch.rollout(num_steps, record=self._recorded, out=self._records)
+            try:
+                self._batch.rollout(num_steps, record=self._recorded, out=self._records)
+            except SimulationError as error:
+                for name, rows in self._records.items():
+                    rows[error.ids] = self._batch.bind(name)[error.ids, np.newaxis]
+                raise
 
     def forward(self, mask: torch.Tensor | None = None, stage: Stage = "all") -> None:
         """Recompute what follows from the state. Mask shape: (num_envs,)."""
@@ -161,8 +166,6 @@ class BatchSimulation:
             # An engine error (an exhausted arena, say) leaves the failing simulations where they
             # were; all others have done what they were to do.
             self._failed[error.ids] = True
-            for name, rows in self._records.items():
-                rows[error.ids] = self._batch.bind(name)[error.ids, np.newaxis]
         self._show()
 
     def _show(self) -> None:

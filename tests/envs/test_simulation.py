@@ -245,6 +245,20 @@ def test_a_simulation_with_an_engine_error_records_where_it_was_before_the_call(
     assert torch.equal(simulation.substeps["qpos"][1, -1].float(), simulation.qpos[1])
 
 
+def test_an_engine_error_of_a_forward_pass_leaves_what_the_last_step_recorded():
+    simulation = _make_in_a_small_arena()
+    simulation.record("qpos", "qvel")
+    simulation.ctrl += 0.2
+    simulation.step(4)
+    before = {name: rows.clone() for name, rows in simulation.substeps.items()}
+    assert not torch.equal(before["qpos"][0, 0], before["qpos"][0, -1])
+    simulation.qpos[0, 2] = 0.1  # belly and legs in the ground: 16 contacts
+    simulation.forward()
+    assert simulation.unstable().tolist() == [True, False]
+    for name, rows in before.items():
+        assert torch.equal(simulation.substeps[name], rows), name
+
+
 def test_a_loaded_state_continues_bit_for_bit(make_standing):
     simulation = make_standing()
     simulation.field("geom_friction")[1, :, 0] = 0.3
