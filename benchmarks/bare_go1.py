@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from gymnasium import spaces
 
+from mute.envs.batch_simulation import as_stepped
 from mute.envs.quadruped_env import NUM_ACTIONS
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.scene import STAND_JOINT_POS, build_scene
@@ -30,7 +31,7 @@ class BareGo1(gymnasium.Env[np.ndarray, np.ndarray]):
             cfg: The task.
         """
         self._decimation = cfg.decimation
-        self._model = build_scene(cfg.scene, pictured=False)
+        self._model = as_stepped(build_scene(cfg.scene, pictured=False))
         self._data = mujoco.MjData(self._model)
         size = self._model.nq + self._model.nv
         self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float64)

@@ -29,10 +29,10 @@ import mujoco
 import torch
 from rich.progress import track
 
-from mute.command_lines.arguments import check_option, command_line, make_directory, parse
+from mute.command_lines.arguments import check_option, command_line, make_directory, parse, spelled
 from mute.controllers import LearnedController, load_policy
 from mute.controllers.learned import Policy
-from mute.envs.engines import make_simulation
+from mute.envs.batch_simulation import BatchSimulation
 from mute.envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import randomize_physics
@@ -47,7 +47,7 @@ from mute.support.errors import run_cli
 from mute.support.provenance import machine_kind
 from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
-from mute.support.threads import use_collection_threads
+from mute.support.threads import core_share, use_collection_threads
 from mute.tasks import DEFAULT_TASK
 
 __all__ = ["VARIANTS", "PhysicsBenchmarkArgs", "Variant"]
@@ -82,6 +82,8 @@ class Variant:
     """Changes what no configuration can; not walked in the second part."""
     pictured: bool = False
     """Whether shapes that are only to be seen are there."""
+    trees: bool = False
+    """Whether bodies have trees of boxes around their shapes, see `as_stepped`."""
 
 
 def _scene(**changes: Any) -> CfgEdit:  # noqa: ANN401
@@ -141,6 +143,7 @@ AS_IT_IS = Variant("as it is")
 VARIANTS = (
     AS_IT_IS,
     Variant("with the shapes that are only to be seen", pictured=True),
+    Variant("with trees of boxes around the shapes of a body", trees=True),
     Variant("with a search for islands", spec=_with(mujoco.mjtDisableBit.mjDSBL_ISLAND)),
     Variant("hips touch the ground as well", spec=_hips_collide),
     Variant("thighs and shanks touch nothing", spec=_only_feet_collide),
@@ -187,6 +190,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if args.out is not None:
         make_directory(args.out.parent)
     content: dict[str, Any] = {"task": policy.task, "machine": machine_kind()}
+    content["options"] = spelled(args, ("policy", "num_envs", "turns"))
     content |= {"mujoco": mujoco.__version__, "num_envs": args.num_envs, "stopped": _UNFINISHED}
     content |= {"turns": 0, "rates": [], "fidelity": [], "touching": []}
     try:
@@ -322,7 +326,8 @@ def _simulation(variant: Variant, cfg: QuadrupedEnvCfg) -> Simulation:
     spec = make_spec(cfg.scene, pictured=variant.pictured)
     if variant.spec is not None:
         variant.spec(spec)
-    simulation = make_simulation(spec.compile(), cfg.num_envs)
+    threads = min(core_share(), cfg.num_envs)
+    simulation = BatchSimulation(spec.compile(), cfg.num_envs, threads, variant.trees)
     simulation.record("sensordata")
     randomize_physics(simulation, cfg.randomization, torch.Generator().manual_seed(cfg.seed))
     return simulation
@@ -347,7 +352,9 @@ def _fidelity(policy: Policy, quiet: bool) -> Iterator[dict[str, Any]]:
     finest = dataclasses.replace(
         cfg, scene=dataclasses.replace(cfg.scene, timestep=REFERENCE), decimation=steps
     )
-    walked = [variant for variant in VARIANTS if variant.spec is None and not variant.pictured]
+    walked = [
+        variant for variant in VARIANTS if not (variant.spec or variant.pictured or variant.trees)
+    ]
     for beta in (0.0, 1.0):
         reference = walk_figures(policy, finest, beta)
         for variant in walked if quiet else track(walked, f"walks at beta {beta:g}"):

@@ -15,7 +15,7 @@ from .engine_version import check_version, version_entry
 from .model_fields import load_fields, saved_fields
 from .simulation import MAX_SPEED, Stage
 
-__all__ = ["BatchSimulation"]
+__all__ = ["BatchSimulation", "as_stepped"]
 
 _WRITTEN = ("qpos", "qvel", "ctrl")
 """Arrays that the environment may write, parts of the engine's state."""
@@ -40,19 +40,26 @@ class BatchSimulation:
     touched keeps its state to the last bit.
     """
 
-    def __init__(self, model: mujoco.MjModel, num_envs: int, num_threads: int = 1) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        num_envs: int,
+        num_threads: int = 1,
+        trees: bool | None = None,
+    ) -> None:
         """Allocate the simulations.
 
         Args:
             model: The compiled model; it is copied.
             num_envs: Number of simulations.
             num_threads: Size of the thread pool, 1 or more.
+            trees: See `as_stepped`.
         """
-        self.model = model
+        self.model = as_stepped(model, trees)
         self.num_envs = num_envs
         self.device = torch.device("cpu")
         self.substeps: dict[str, torch.Tensor] = {}
-        self._batch = Batch(_stepped(model), num_envs, num_threads)
+        self._batch = Batch(self.model, num_envs, num_threads)
         self._own = {name: self._batch.bind(name) for name in (*_WRITTEN, *_READ)}
         self._shown = {name: own.astype(np.float32) for name, own in self._own.items()}
         self._seen = {name: self._shown[name].copy() for name in _WRITTEN}
@@ -188,13 +195,22 @@ class BatchSimulation:
         self.substeps = {name: torch.from_numpy(rows) for name, rows in self._records.items()}
 
 
-def _stepped(model: mujoco.MjModel) -> mujoco.MjModel:
-    """Return the model as it is stepped: without trees of boxes around shapes, where these are few.
+def as_stepped(model: mujoco.MjModel, trees: bool | None = None) -> mujoco.MjModel:
+    """Return a model as it is stepped on the CPU: mostly without trees of boxes around shapes.
 
     A limb has one or two shapes, and a floor often one. To test them all is quicker then, and the
     contacts are the same. MuJoCo Warp has no such trees, and refuses the flag.
+
+    Args:
+        model: The compiled model.
+        trees: Whether to have them; None where a body has many shapes.
+
+    Returns:
+        The model itself, or a copy that differs in that.
     """
-    if model.body_geomnum.max() > _MANY_SHAPES:
+    if trees is None:
+        trees = bool(model.body_geomnum.max() > _MANY_SHAPES)
+    if trees:
         return model
     model = copy.copy(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import tyro
 
@@ -35,6 +36,7 @@ __all__ = [
     "parse",
     "resolve_device",
     "selected_task",
+    "spelled",
     "task_name",
 ]
 
@@ -106,6 +108,25 @@ def _current_option(word: str) -> str:
     option, equals, value = word.removeprefix("--").partition("=")
     moved = MOVED.get(option.replace("-", "_"))
     return f"--{moved.replace('_', '-')}{equals}{value}" if moved else word
+
+
+def spelled(args: Any, names: Sequence[str]) -> str:  # noqa: ANN401
+    """Return, as they are typed, the options that differ from their defaults.
+
+    Args:
+        args: A dataclass of arguments whose fields have plain defaults.
+        names: The fields to look at.
+
+    Returns:
+        A word for each, with a space before it; nothing if all are as they are.
+    """
+    words: list[str] = []
+    for field in dataclasses.fields(args):
+        value = getattr(args, field.name)
+        if field.name in names and value != field.default:
+            values = value if isinstance(value, tuple) else (value,)
+            words += [f"--{field.name.replace('_', '-')}", *map(str, values)]
+    return "".join(f" {word}" for word in words)
 
 
 def is_given(option: str, argv: Sequence[str]) -> bool:

@@ -41,6 +41,7 @@ from mute.command_lines.arguments import (
     check_seed,
     command_line,
     parse,
+    spelled,
     task_name,
 )
 from mute.command_lines.benchmark_figures import (
@@ -147,6 +148,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     versions = [THIS, *([other_version(args.against)] if args.against else [])]
     content: dict[str, Any] = {"task": task_name(args.task), "machine": machine_kind()}
     content |= {"load_before": os.getloadavg()[0], "stopped": None}
+    content["options"] = spelled(args, _MEASURING)
     try:
         if args.until_walking:
             keep = functools.partial(_keep, args, content)
@@ -162,6 +164,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         raise
     _tell(args, content)
     return 0
+
+
+_MEASURING = ("num_envs", "precision", "block_turns", "max_turns", "rollouts", "seed", "seeds")
+"""Options that decide on what is measured and how long."""
 
 
 def _has_figures(content: Mapping[str, Any]) -> bool:
@@ -224,8 +230,7 @@ def _measure(args: BenchmarkArgs, versions: Sequence[Version], content: dict[str
             raise MuteError(f"--num-envs {num_envs}: {error}") from error
         finally:
             if blocks:
-                ready = blocks[0].ready
-                content["versions"] = {name: _versions(each) for name, each in ready.items()}
+                content["versions"] = _same_versions(blocks)
                 content["rates"].append(_row(num_envs, blocks, args.precision))
                 _keep(args, content)
 
@@ -243,6 +248,25 @@ def _enough(blocks: Sequence[Block], args: BenchmarkArgs) -> bool:
         return True
     whole = blocks[-1].turns == args.block_turns
     return whole and is_precise(times_of(blocks), args.precision)
+
+
+def _same_versions(blocks: Sequence[Block]) -> dict[str, dict[str, Any]]:
+    """Return what the processes of all blocks say of their versions.
+
+    Raises:
+        MuteError: If a tree or an environment has changed in between.
+    """
+    first, *others = (
+        {name: _versions(ready) for name, ready in block.ready.items()} for block in blocks
+    )
+    for other in others:
+        for name, version in other.items():
+            if version != first[name]:
+                raise MuteError(
+                    f"the {name} version has changed while it was measured, from {first[name]} to "
+                    f"{version}: keep its tree as it is and begin anew"
+                )
+    return first
 
 
 def _versions(ready: Mapping[str, Any]) -> dict[str, Any]:
@@ -339,7 +363,8 @@ def _told_of_walks(content: Mapping[str, Any]) -> Iterator[str]:
     """Yield the lines that compare the versions' walks."""
     median, neither = content["median_old_over_new"], content["neither_walks"]
     if median is not None:
-        told = f"{median:.2f}" if isinstance(median, float) else "the old version never walks"
+        never = {"never": "the old version never walks", 0.0: "the new version never walks"}
+        told = never.get(median) or f"{median:.2f}"
         yield f"old / new, median over seeds: {told}\n"
     if neither:
         yield f"seeds with which neither version walks, left out: {neither}\n"

@@ -26,6 +26,7 @@ from typing import Any
 
 from mute.command_lines.benchmark_turns import Version
 from mute.support.errors import MuteError
+from mute.support.provenance import current_commit
 
 __all__ = ["time_to_walk"]
 
@@ -40,7 +41,7 @@ _INTERVAL = 5
 """Iterations between checkpoints."""
 
 _FIRST = 40
-"""First iteration whose policy is looked at: none has walked before the 80th."""
+"""First iteration whose policy is looked at: none has walked before the 65th."""
 
 _POLL = 0.05
 """How often it is looked for a new checkpoint, s."""
@@ -62,8 +63,8 @@ def time_to_walk(
         versions: New alone, or new and old.
         task: Name of the task.
         seeds: Of the trainings.
-        content: Gets `definition`, `walking`, a row for each training, and what `_compared` says
-            of them.
+        content: Gets `commits`, `definition`, `walking`, a row for each training, and what
+            `_compared` says of them.
         keep: Called after each training, for `content` to be kept.
 
     Raises:
@@ -75,6 +76,9 @@ def time_to_walk(
                 f"--until-walking needs a checkout of the {version.name} version, with its train.py"
             )
     rows: list[dict[str, Any]] = []
+    content["commits"] = {
+        version.name: current_commit(version.checkout) for version in versions if version.checkout
+    }
     content |= {"definition": DEFINITION, "walking": rows, **_compared(rows)}
     for number, seed in enumerate(seeds):
         for version in list(versions)[:: 1 if number % 2 == 0 else -1]:

@@ -221,12 +221,12 @@ class _Batch:
         self._ctrl = self._batch.bind("ctrl")
         own = module.__name__ == "mujoco.batch"
         self.state = self._batch.state if own else self._batch.bind("state")
+        """Live rows, all that a simulation continues from. Shape: (num_envs, num_state)."""
         past = ("history",) if not own and env.simulation.model.nhistory else ()
         of_kind = () if own else (np.float32,)
         self._read = [self._batch.bind(name, *of_kind) for name in (*_READ, *past)]
         recorded = getattr(env.simulation, "substeps", {})
         self._records = {name: np.zeros_like(rows.numpy()) for name, rows in recorded.items()}
-        """Live rows, all that a simulation continues from. Shape: (num_envs, num_state)."""
         self._batch.reset(keyframe=env.simulation.model.key("stand").id)
         self.standing = self.state[0].copy()
         """The row of a robot that stands."""

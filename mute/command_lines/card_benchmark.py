@@ -47,6 +47,8 @@ _PARTS_OF_SOUND = {
     "lone walk": "one robot: everything",
 }
 
+_OF_A_WALK = {"minutes": ("minutes", "{:.2f}"), "iteration": ("iterations", "{}")}
+
 _INTERVALS = (
     "Turns are taken in blocks of a few, each with fresh processes and a seed of its own. Each "
     "figure is the median over the blocks' medians, and in brackets stands its 95 % interval, from "
@@ -76,12 +78,15 @@ class BenchmarkFiles:
     """What it takes to hear robots."""
     physics: Mapping[str, Any]
     """What parts of the physics cost."""
+    walking: Mapping[str, Any]
+    """How soon trainings walk."""
 
 
 def benchmark_page(files: BenchmarkFiles) -> str:
     """Return the whole page."""
     physics = physics_section(files.physics)
-    parts = (_head(), _training(files.training), physics, _peers(files), _sound(files))
+    training = _training(files.training), _walking(files.walking)
+    parts = (_head(), *training, physics, _peers(files), _sound(files))
     return "\n\n".join(parts) + "\n"
 
 
@@ -97,7 +102,6 @@ def _head() -> str:
 
 def _training(measured: Mapping[str, Any]) -> str:
     rows = [line for row in measured["rates"] for line in _lines(row)]
-    sizes = " ".join(str(row["num_envs"]) for row in measured["rates"])
     compared = "old" in measured["versions"]
     against = " --against PYTHON:CHECKOUT" if compared else ""
     parts = "\n".join(
@@ -105,7 +109,7 @@ def _training(measured: Mapping[str, Any]) -> str:
     )
     return (
         "## Training\n\n"
-        f"`python -m mute.benchmark --num-envs {sizes}{against} --out docs/benchmark.json` on "
+        f"`python -m mute.benchmark{measured['options']}{against} --out docs/benchmark.json` on "
         f"{measured['machine']}, with a load average of {measured['load_before']:.1f} from other "
         f"work as it began. {_versions(measured['versions'])}\n\n"
         f"{markdown(rows, _MEASURED)}\n\n"
@@ -120,6 +124,47 @@ def _training(measured: Mapping[str, Any]) -> str:
         "quite the quotient of two medians. A training goes on from turn to turn; its first "
         "actions have a standard deviation of 0.4."
     )
+
+
+def _walking(measured: Mapping[str, Any]) -> str:
+    """Return how soon trainings walk, and how many times as soon as those of the old version."""
+    versions = measured["commits"]
+    rows = {
+        seed: {"seed": seed} for seed in dict.fromkeys(row["seed"] for row in measured["walking"])
+    }
+    for row in measured["walking"]:
+        for name, (_, form) in _OF_A_WALK.items():
+            value = "never" if row[name] is None else form.format(row[name])
+            rows[row["seed"]][f"{row['version']} {name}"] = value
+    columns = {"seed": ("seed", "{}")}
+    for version in versions:
+        for name, (caption, _) in _OF_A_WALK.items():
+            columns[f"{version} {name}"] = (f"{version}: {caption}", "{}")
+    commits = " ".join(
+        f"{name.capitalize()} is commit {commit[:10]}{_changed(commit)}."
+        for name, commit in versions.items()
+    )
+    against = " --against PYTHON:CHECKOUT" if "old" in versions else ""
+    cut = f" The run was cut short: {measured['stopped']}." if measured["stopped"] else ""
+    return (
+        "## From nothing to a walk\n\n"
+        f"`python -m mute.benchmark --until-walking{measured['options']}{against} --out "
+        f"docs/walking.json` on {measured['machine']}, with a load average of "
+        f"{measured['load_before']:.1f} from other work as it began: {measured['definition']}. "
+        f"{commits}{cut}\n\n"
+        f"{markdown(list(rows.values()), columns)}{''.join(_compared(measured))}"
+    )
+
+
+def _compared(measured: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what is said of both versions' times."""
+    median = measured["median_old_over_new"]
+    if median in (0.0, "never"):
+        yield f"\n\nThe {'new' if median == 0.0 else 'old'} one never walks with most seeds."
+    elif median is not None:
+        yield f"\n\nThe old one takes {median:.2f} times as long, by the median over seeds."
+    if measured["neither_walks"]:
+        yield f" Seeds with which neither walks, left out: {measured['neither_walks']}."
 
 
 def _lines(row: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
@@ -175,7 +220,8 @@ def _peers(files: BenchmarkFiles) -> str:
         (
             "## Other simulations on the CPU",
             "`python -m benchmarks.make_peers --into DIR` makes their environments, and `python -m "
-            "mute.benchmark --peers all --peers-from DIR` times them in turns with MUTE itself: "
+            f"mute.benchmark{files.peers['options']} --peers all --peers-from DIR` times them in "
+            "turns with MUTE itself: "
             "the environment alone, and their own training loops, all of an iteration, without "
             "what is compiled before. Medians over rounds, in brackets the 95 % interval where "
             "there are six or more. mjlab, MuJoCo Playground and UniLab have robots and tasks of "

@@ -25,7 +25,8 @@ def physics_section(measured: Mapping[str, Any]) -> str:
     rows = [_cells(rate, measured["fidelity"]) for rate in measured["rates"]]
     return (
         "## What the physics costs\n\n"
-        f"`python -m benchmarks.physics --out docs/physics.json`: {measured['num_envs']:,} "
+        f"`python -m benchmarks.physics{measured['options']} --out docs/physics.json`: "
+        f"{measured['num_envs']:,} "
         "randomised robots of the policy that ships, with exploration; the bare engine does their "
         "rollout again with one thing changed at a time, all in turns in one process "
         f"({measured['turns']} turns, {measured['machine']}, MuJoCo {measured['mujoco']}). Speed "

@@ -18,8 +18,8 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 """Top of the checkout; of an installed package, the directory that it is in."""
 
 
-def current_commit() -> str:
-    """Return the commit of the working tree, with '-dirty' if it differs.
+def current_commit(repository: Path | None = None) -> str:
+    """Return the commit of a working tree, this one's by default, with '-dirty' if it differs.
 
     It is 'unknown' outside a working tree, and where there is no git program to look at one.
     Files in `docs`, where results are written one after the other, may differ: no result depends on
@@ -27,9 +27,9 @@ def current_commit() -> str:
     """
     git = import_git()
     try:
-        repository = git.Repo(REPOSITORY)
-        suffix = "-dirty" if repository.is_dirty(path=":(exclude)docs") else ""
-        return f"{repository.head.commit.hexsha}{suffix}"
+        tree = git.Repo(repository or REPOSITORY)
+        suffix = "-dirty" if tree.is_dirty(path=":(exclude)docs") else ""
+        return f"{tree.head.commit.hexsha}{suffix}"
     except (git.GitError, OSError, ValueError):
         return "unknown"
 

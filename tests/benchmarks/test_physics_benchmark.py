@@ -52,7 +52,8 @@ def _compiled(variant: benchmark.Variant) -> bytes:
     model = spec.compile()
     content = np.empty(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, content)
-    return content.tobytes() + repr((cfg.decimation, cfg.randomization)).encode()
+    settings = cfg.decimation, cfg.randomization, variant.trees
+    return content.tobytes() + repr(settings).encode()
 
 
 def test_every_variant_is_compiled_to_another_one_than_the_scene_as_it_is():

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 import torch
 from bare_go1 import BareGo1
-from mujoco.batch import Batch
 from places import REPOSITORY
 
 from mute import tasks
 from mute.command_lines import benchmark
-from mute.command_lines.arguments import parse
+from mute.command_lines.arguments import parse, spelled
 from mute.command_lines.benchmark_figures import figures_of, ratios, shortfall
 from mute.command_lines.benchmark_peers import PeerRate
 from mute.command_lines.benchmark_turns import Block, Times, times_of
+from mute.envs.batch_simulation import BatchSimulation
 from mute.envs.quadruped_env import NUM_ACTIONS
 from mute.envs.scene import STAND_JOINT_POS, build_scene
 from mute.support import provenance
@@ -315,13 +315,29 @@ def test_the_benchmark_refuses_bad_input_by_name(arguments, names):
         benchmark.main(arguments)
 
 
+def test_what_decides_on_the_measurement_is_kept_as_it_is_typed():
+    args = _args("--num-envs", "8", "16", "--max-turns", "18", "--json")
+    assert spelled(args, benchmark._MEASURING) == " --num-envs 8 16 --max-turns 18"
+    assert spelled(_args(), benchmark._MEASURING) == ""
+
+
+def test_a_version_that_changes_while_it_is_measured_is_refused():
+    about = {"control_steps": 24, "peak_memory_mb": 500.0, "commit": "a"}
+    blocks = [Block({"new": about | {"peak_memory_mb": float(size)}}, {}) for size in (5, 6)]
+    assert benchmark._same_versions(blocks) == {"new": {"commit": "a"}}
+    blocks.append(Block({"new": about | {"commit": "b"}}, {}))
+    with pytest.raises(MuteError, match=r"the new version has changed .* from .*'a'.* to .*'b'"):
+        benchmark._same_versions(blocks)
+
+
 def test_the_robots_of_gymnasium_move_as_those_of_the_engine():
     cfg = make_task(DEFAULT_TASK).env
-    model = build_scene(cfg.scene, pictured=False)
-    batch = Batch(model, 1)
+    simulation = BatchSimulation(build_scene(cfg.scene, pictured=False), 1)
+    model, batch = simulation.model, simulation._batch
     ctrl, qpos = batch.bind("ctrl"), batch.bind("qpos")
     batch.reset(keyframe=model.key("stand").id)
     robot = BareGo1(cfg)
+    assert robot._model.opt.disableflags == model.opt.disableflags
     start, _ = robot.reset(seed=0)
     observation = start
     for action in 0.1 * np.random.default_rng(0).standard_normal((20, NUM_ACTIONS)):

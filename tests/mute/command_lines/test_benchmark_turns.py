@@ -61,6 +61,8 @@ def test_engine_and_environment_do_again_what_the_training_did(training, replay)
         replay.engine()
         qpos = torch.from_numpy(replay._batch.state[:, _QPOS].copy()).float()
         torch.testing.assert_close(qpos, simulation.qpos, atol=1e-3, rtol=1e-3)
+    flags = replay._batch._batch.model.opt.disableflags
+    assert flags == simulation._batch.model.opt.disableflags  # of one and the same model
     friction = simulation.field("geom_friction").numpy()
     assert (replay._batch._batch.expand("geom_friction") == friction).all()
     assert friction.std() > 0.0

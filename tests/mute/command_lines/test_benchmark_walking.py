@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import git
 import pytest
 
 from mute.command_lines import benchmark, benchmark_walking
@@ -90,8 +91,13 @@ def test_versions_walk_in_turns_and_the_median_over_seeds_compares_them(tmp_path
         _version("new", _checkout(tmp_path / "new", walks_at=0)),
         _version("old", _checkout(tmp_path / "old", walks_at=50)),
     ]
+    repository = git.Repo.init(tmp_path / "old")
+    repository.index.add(["train.py"])
+    author = git.Actor("A", "a@example.org")
+    commit = repository.index.commit("begin", author=author, committer=author).hexsha
     content: dict = {}
     time_to_walk(versions, "go1_mute", [0, 1], content)
+    assert content["commits"] == {"new": "unknown", "old": commit}
     order = [(row["seed"], row["version"], row["iteration"]) for row in content["walking"]]
     assert order == [(0, "new", 40), (0, "old", 50), (1, "old", 50), (1, "new", 40)]
     assert content["median_old_over_new"] == pytest.approx(50.0 / 40.0, rel=0.1)

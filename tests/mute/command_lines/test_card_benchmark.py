@@ -17,6 +17,7 @@ _SOUND = {
     "memory_growth_mb": 0.0,
 }
 _PHYSICS = {
+    "options": " --turns 6",
     "num_envs": 1024,
     "turns": 6,
     "machine": "a machine of physics",
@@ -32,6 +33,22 @@ _PHYSICS = {
     ],
     "touching": [{"shape": "foot", "policy": 1.0, "beginning": 0.25}],
 }  # fmt: skip
+_WALKING = {
+    "machine": "a machine that learns",
+    "stopped": None,
+    "load_before": 0.75,
+    "options": " --seeds 3 5",
+    "definition": "minutes until it walks",
+    "commits": {"new": "a" * 40, "old": "b" * 40 + "-dirty"},
+    "walking": [
+        {"seed": 3, "version": "new", "minutes": 2.0, "iteration": 60},
+        {"seed": 3, "version": "old", "minutes": 3.0, "iteration": 65},
+        {"seed": 5, "version": "old", "minutes": None, "iteration": None},
+        {"seed": 5, "version": "new", "minutes": 4.0, "iteration": 80},
+    ],
+    "median_old_over_new": 1.5,
+    "neither_walks": 0,
+}
 _PEER = {"version": "1.0", "num_envs": 8, "environment": 6000.0, "note": "steps something"}
 
 
@@ -52,6 +69,7 @@ def _measured() -> dict:
     return {
         "machine": "a machine",
         "load_before": 0.25,
+        "options": " --max-turns 18",
         "stopped": None,
         "parts": PARTS,
         "versions": {"new": _version("a" * 40, "one 2"), "old": _version("b" * 40, "two 1")},
@@ -60,11 +78,16 @@ def _measured() -> dict:
     }
 
 
-def _page(measured: dict) -> str:
-    peers = {"machine": "a machine of peers", "peers": [_PEER | {"name": "mjlab"}]}
-    return benchmark_page(
-        BenchmarkFiles(training=measured, peers=peers, sound=_SOUND, physics=_PHYSICS)
+def _page(measured: dict, walking: dict = _WALKING) -> str:
+    peers = {
+        "machine": "a machine of peers",
+        "options": " --rollouts 6",
+        "peers": [_PEER | {"name": "mjlab"}],
+    }
+    files = BenchmarkFiles(
+        training=measured, peers=peers, sound=_SOUND, physics=_PHYSICS, walking=walking
     )
+    return benchmark_page(files)
 
 
 def _lines(page: str) -> list[list[str]]:
@@ -86,7 +109,7 @@ def test_a_version_alone_is_not_compared():
     del measured["versions"]["old"], measured["rates"][0]["old"]
     page = _page(measured)
     assert [line[1] for line in _lines(page)] == ["new"]
-    assert "--against" not in page
+    assert "--max-turns 18 --out docs/benchmark.json" in page
 
 
 def test_the_page_says_what_each_part_is_of_which_versions_and_on_what_machine():
@@ -152,3 +175,36 @@ def test_a_file_of_the_physics_that_was_cut_short_says_so(monkeypatch):
     assert "cut short" not in _page(_measured())
     monkeypatch.setitem(_PHYSICS, "stopped", "interrupted")
     assert "The run was cut short: interrupted." in _page(_measured())
+
+
+def test_how_soon_trainings_walk_stands_seed_by_seed_with_both_versions_beside_each_other():
+    page = _page(_measured())
+    assert "| seed | new: minutes | new: iterations | old: minutes | old: iterations |" in page
+    assert "| 3 | 2.00 | 60 | 3.00 | 65 |" in page
+    assert "| 5 | 4.00 | 80 | never | never |" in page
+    assert "--until-walking --seeds 3 5 --against PYTHON:CHECKOUT" in page
+    assert "New is commit aaaaaaaaaa. Old is commit bbbbbbbbbb (changed)." in page
+    assert "takes 1.50 times as long" in page
+    assert "left out" not in page
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"median_old_over_new": "never"}, "The old one never walks with most seeds"),
+        ({"median_old_over_new": 0.0}, "The new one never walks with most seeds"),
+        ({"neither_walks": 2}, "neither walks, left out: 2"),
+        ({"stopped": "interrupted"}, "cut short: interrupted"),
+    ],
+)
+def test_what_is_missing_of_the_walks_is_told(changes, says):
+    assert says in _page(_measured(), _WALKING | changes)
+
+
+def test_walks_of_one_version_alone_are_compared_with_nothing():
+    rows = [row for row in _WALKING["walking"] if row["version"] == "new"]
+    alone = {"commits": {"new": "a" * 40}, "walking": rows, "median_old_over_new": None}
+    section = _page(_measured(), _WALKING | alone).partition("## What the physics")[0]
+    section = section.partition("## From nothing")[2]
+    assert "| 5 | 4.00 | 80 |" in section
+    assert "old" not in section.lower()
