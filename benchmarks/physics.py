@@ -280,10 +280,15 @@ def _record(policy: Policy | None, cfg: QuadrupedEnvCfg, action_std: float) -> _
 
 
 def _touches(env: QuadrupedEnv, shape: str) -> torch.Tensor:
-    """Return which shapes of a kind touch the ground. Shape: (num_envs, shapes)."""
+    """Return which shapes of a kind touched the ground in the last control step.
+
+    At any of its physics steps, before a robot that fell was put on its feet again.
+
+    Shape: (num_envs, shapes).
+    """
     names = [shape] if shape == "trunk" else [f"{leg}_{shape}" for leg in LEGS]
     columns = [sensor_slice(env.model, f"{name}_contact", 1).start for name in names]
-    return env.simulation.sensordata[:, columns] > 0.0
+    return (env.simulation.substeps["sensordata"][:, :, columns] > 0.0).any(dim=1)
 
 
 def _rates(
