@@ -38,8 +38,8 @@ class CardArgs:
     """Directory of what `evaluate.py reliability` wrote of several seeds, as seed0.json, seed1.json
     and so on, with what `evaluate.py progress` wrote of each as seed0_progress.json."""
     benchmark: Path = _DOCS / "benchmark.json"
-    """File that `mute.benchmark --out` wrote; peers.json, physics.json and walking.json lie beside
-    it."""
+    """File that `mute.benchmark --out` wrote; peers.json, peer_walks.json, physics.json and
+    walking.json lie beside it."""
     out: Path | None = None
     """Directory of the pages results.md and benchmark.md; printed if not given."""
 
@@ -103,6 +103,7 @@ def read_benchmarks(args: CardArgs) -> BenchmarkFiles:
         sound=_read(args.noise.parent / "benchmark.json"),
         physics=_read(docs / "physics.json"),
         walking=_read(docs / "walking.json"),
+        peer_walks=_read(docs / "peer_walks.json"),
     )
 
 

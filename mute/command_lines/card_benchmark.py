@@ -9,6 +9,7 @@ from typing import Any
 from mute.command_lines.benchmark_figures import CAPTIONS, PARTS, with_interval
 from mute.command_lines.card_physics import physics_section
 from mute.command_lines.card_tables import markdown
+from mute.command_lines.card_targets import targets_section
 
 __all__ = ["BenchmarkFiles", "benchmark_page"]
 
@@ -31,6 +32,16 @@ _PEERS = {
     "environment": ("environment alone", "{}"),
     "loop": ("whole training loop", "{}"),
     "note": ("note", "{}"),
+}
+_PEER_WALKS = {
+    "name": ("peer", "{}"),
+    "task": ("task", "{}"),
+    "num_envs": ("environments", "{}"),
+    "minutes": ("trained for (min)", "{:.1f}"),
+    "steps": ("control steps", "{:,}"),
+    "velocity_error_sq": ("error ((m/s)²)", "{:.3f}"),
+    "fall_rate": ("falls", "{:.0%}"),
+    "walks": ("walks", "{}"),
 }
 _PARTS = {
     "name": ("part", "{}"),
@@ -80,12 +91,16 @@ class BenchmarkFiles:
     """What parts of the physics cost."""
     walking: Mapping[str, Any]
     """How soon trainings walk."""
+    peer_walks: Mapping[str, Any]
+    """How far peers' own trainings come."""
 
 
 def benchmark_page(files: BenchmarkFiles) -> str:
     """Return the whole page."""
     physics = physics_section(files.physics)
     training = _training(files.training), _walking(files.walking)
+    if "old" in files.training["versions"]:
+        training = *training, targets_section(files.training, files.walking)
     parts = (_head(), *training, physics, _peers(files), _sound(files))
     return "\n\n".join(parts) + "\n"
 
@@ -228,7 +243,28 @@ def _peers(files: BenchmarkFiles) -> str:
             "their own. The engines of mjlab and MuJoCo Playground, Warp and MJX, are meant for "
             "GPUs, and the batches and epochs of the peers' trainings for other numbers of robots.",
             *tables,
+            _peer_walks(files.peer_walks),
         )
+    )
+
+
+def _peer_walks(measured: Mapping[str, Any]) -> str:
+    """Return whether peers' own policies walk within the time that they were given."""
+    names = ",".join(row["name"] for row in measured["peers"])
+    limit, every = measured["limit_minutes"], measured["tried_every_minutes"]
+    trials = [
+        {"name": row["name"], "task": row["task"], "num_envs": row["num_envs"]} | trial
+        for row in measured["peers"]
+        for trial in row["trials"]
+    ]
+    for trial in trials:
+        trial["walks"] = "yes" if trial["walks"] else "no"
+    return (
+        "Whether a peer's own policy walks, by the definition of the walks above, on its own robot "
+        f"and commands: `python -m benchmarks.peer_walks --peers {names} --peers-from DIR "
+        f"--minutes {limit:g} --every {every:g} --out docs/peer_walks.json`, on "
+        f"{measured['machine']}. Who is not in it was given no training.\n\n"
+        f"{markdown(trials, _PEER_WALKS)}"
     )
 
 

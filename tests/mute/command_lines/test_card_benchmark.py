@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-import pytest
+import json
 
+import pytest
+from places import REPOSITORY
+
+from benchmarks.physics import VARIANTS
 from mute.command_lines.benchmark_figures import PARTS, comparison, figures_of
 from mute.command_lines.card_benchmark import BenchmarkFiles, benchmark_page
 
@@ -49,6 +53,24 @@ _WALKING = {
     "median_old_over_new": 1.5,
     "neither_walks": 0,
 }
+_PEER_WALKS = {
+    "machine": "a machine where peers learn",
+    "limit_minutes": 9.0,
+    "tried_every_minutes": 3.0,
+    "peers": [
+        {
+            "name": "unilab",
+            "task": "a task",
+            "num_envs": 1024,
+            "trials": [
+                {"minutes": 3.04, "steps": 5000, "velocity_error_sq": 0.3, "fall_rate": 0.5,
+                 "walks": False},
+                {"minutes": 6.0, "steps": 10000, "velocity_error_sq": 0.04, "fall_rate": 0.0,
+                 "walks": True},
+            ],
+        }
+    ],
+}  # fmt: skip
 _PEER = {"version": "1.0", "num_envs": 8, "environment": 6000.0, "note": "steps something"}
 
 
@@ -85,7 +107,12 @@ def _page(measured: dict, walking: dict = _WALKING) -> str:
         "peers": [_PEER | {"name": "mjlab"}],
     }
     files = BenchmarkFiles(
-        training=measured, peers=peers, sound=_SOUND, physics=_PHYSICS, walking=walking
+        training=measured,
+        peers=peers,
+        sound=_SOUND,
+        physics=_PHYSICS,
+        walking=walking,
+        peer_walks=_PEER_WALKS,
     )
     return benchmark_page(files)
 
@@ -177,6 +204,23 @@ def test_a_file_of_the_physics_that_was_cut_short_says_so(monkeypatch):
     assert "The run was cut short: interrupted." in _page(_measured())
 
 
+def test_what_was_aimed_at_stands_beside_what_was_reached():
+    section = _page(_measured()).partition("## What was aimed at")[2].partition("\n## ")[0]
+    assert "| figure | aimed at | at 1024 robots |" in section
+    assert "| engine, new / old | >= 1.2 | 2.00 [2.00, 2.00] |" in section
+    assert "| whole loop / engine | >= 65% | 100% [100%, 100%] |" in section
+    assert "| memory | < 1200 MB | 500 MB |" in section
+    assert "median over seeds | >= 1.23 | 1.50 |" in section
+    assert "at 1024 robots the engine takes 100% of an iteration and learning 100%" in section
+
+
+def test_trials_of_peers_own_policies_stand_in_order():
+    page = _page(_measured())
+    assert "--peers unilab --peers-from DIR --minutes 9 --every 3" in page
+    assert "| unilab | a task | 1024 | 3.0 | 5,000 | 0.300 | 50% | no |" in page
+    assert "| unilab | a task | 1024 | 6.0 | 10,000 | 0.040 | 0% | yes |" in page
+
+
 def test_how_soon_trainings_walk_stands_seed_by_seed_with_both_versions_beside_each_other():
     page = _page(_measured())
     assert "| seed | new: minutes | new: iterations | old: minutes | old: iterations |" in page
@@ -208,3 +252,8 @@ def test_walks_of_one_version_alone_are_compared_with_nothing():
     section = section.partition("## From nothing")[2]
     assert "| 5 | 4.00 | 80 |" in section
     assert "old" not in section.lower()
+
+
+def test_the_committed_figures_are_of_the_variants_that_there_are():
+    measured = json.loads((REPOSITORY / "docs" / "physics.json").read_text())
+    assert [row["variant"] for row in measured["rates"]] == [each.name for each in VARIANTS]
