@@ -28,6 +28,12 @@ class CommandsCfg:
     """Quiet factor; 0 asks for speed, 1 for silence."""
     standing_fraction: float = 0.1
     """Share of the velocity commands that are zero."""
+    single_axis_fraction: float = 0.0
+    """Share of them that go along one axis or turn, one of the three alone, as people drive."""
+    slow_fraction: float = 0.0
+    """Share of them that are slow."""
+    slow_share: float = 0.3
+    """Share of the velocity ranges that slow ones are drawn from."""
     resampling_time: float = 10.0
     """Time between new velocity commands within an episode, s."""
     initial_share: float = 1.0
@@ -52,6 +58,9 @@ _RANGES = {
     "ang_vel_z": Range(-100.0, 100.0),
     "beta": Range(0.0, 1.0),
     "standing_fraction": Range(0.0, 1.0),
+    "single_axis_fraction": Range(0.0, 1.0),
+    "slow_fraction": Range(0.0, 1.0),
+    "slow_share": Range(0.0, 1.0),
     "resampling_time": Range(0.0, 1e12, above=True),
     "initial_share": Range(0.0, 1.0),
     "ramp": Range(0.0, 1e12),
@@ -93,11 +102,31 @@ class CommandSampler:
             with_beta: Whether beta is drawn too, as it is at the start of an episode.
             progress: How far the ranges have grown, from 0 (the initial share) to 1 (all).
         """
-        draw = torch.rand(self.command.shape[0], 5, generator=self.generator, device=mask.device)
+        cfg = self.cfg
+        shaped = cfg.slow_fraction > 0.0 or cfg.single_axis_fraction > 0.0
+        size = self.command.shape[0], 8 if shaped else 5
+        draw = torch.rand(size, generator=self.generator, device=mask.device)
         fresh = self._low + self._span * draw[:, :4]
-        standing = draw[:, 4] < self.cfg.standing_fraction
-        fresh[:, :BETA] *= self.cfg.initial_share + (1.0 - self.cfg.initial_share) * progress
-        fresh[:, :BETA].masked_fill_(standing.unsqueeze(1), 0.0)
+        velocity = fresh[:, :BETA]
+        velocity *= cfg.initial_share + (1.0 - cfg.initial_share) * progress
+        if shaped:
+            self._shape(velocity, draw[:, 5:])
+        standing = draw[:, 4] < cfg.standing_fraction
+        velocity.masked_fill_(standing.unsqueeze(1), 0.0)
         if not with_beta:
             fresh[:, BETA] = self.command[:, BETA]
         torch.where(mask.unsqueeze(1), fresh, self.command, out=self.command)
+
+    def _shape(self, velocity: torch.Tensor, draw: torch.Tensor) -> None:
+        """Slow some of the commands down and leave some a single axis, in place.
+
+        Args:
+            velocity: Velocity commands. Shape: (num_envs, 3).
+            draw: Random numbers in [0, 1). Shape: (num_envs, 3).
+        """
+        slow = draw[:, 0] < self.cfg.slow_fraction
+        velocity *= torch.where(slow, self.cfg.slow_share, 1.0).unsqueeze(1)
+        alone = draw[:, 1] < self.cfg.single_axis_fraction
+        axis = (draw[:, 2:] * BETA).long()
+        others = torch.arange(BETA, device=axis.device) != axis
+        velocity.masked_fill_(alone.unsqueeze(1) & others, 0.0)

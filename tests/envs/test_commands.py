@@ -50,6 +50,28 @@ def test_a_standing_robot_has_no_velocity_but_a_beta():
     assert (sampler.beta >= 0.25).all()
 
 
+def test_the_asked_share_of_the_commands_has_a_single_axis_each_as_often_as_any():
+    sampler = _make_sampler(6000, standing_fraction=0.0, single_axis_fraction=0.6)
+    _resample_all(sampler)
+    alone = (sampler.command[:, :3] != 0.0).sum(dim=1) == 1
+    # Standard deviations: of the share 0.006, of each axis' number sqrt(3600 2/9) = 28.
+    assert alone.float().mean().item() == pytest.approx(0.6, abs=0.025)
+    each = (sampler.command[alone, :3] != 0.0).sum(dim=0) / alone.sum()
+    torch.testing.assert_close(each, torch.full((3,), 1.0 / 3.0), atol=0.03, rtol=0.0)
+
+
+def test_the_asked_share_of_the_commands_is_slow():
+    sampler = _make_sampler(6000, standing_fraction=0.0, slow_fraction=0.5, slow_share=0.2)
+    _resample_all(sampler)
+    forward = sampler.command[:, 0].abs()
+    assert forward.max() > 0.98
+    # All of the slow ones are below 0.2 m/s, and a fifth of the others.
+    assert (forward < 0.2).float().mean().item() == pytest.approx(0.6, abs=0.025)
+    sideways, turning = sampler.command[:, 1].abs() / 0.5, sampler.command[:, 2].abs()
+    slow = forward.maximum(sideways).maximum(turning) < 0.2
+    assert slow.float().mean().item() == pytest.approx(0.5 + 0.5 * 0.2**3, abs=0.025)
+
+
 def test_turning_on_the_spot_is_not_standing():
     sampler = _make_sampler(2)
     sampler.command[:] = torch.tensor([[0.0, 0.0, 0.1, 0.0], [0.0, 0.0, 0.0, 1.0]])
