@@ -23,6 +23,15 @@ CASES = {
         {"command": [[0, 0, 0.5], [0, 0, -1.0]], "base_ang_vel": [[7.0], [0, 0, -1.0]]},
         [math.exp(-1.0), 1.0],
     ),
+    # Nothing asked for and one width too fast; 0.6 and 0.8 m/s asked for, and standing.
+    "lin_vel_following": (
+        {"command": [[], [0.6, 0.8]], "base_lin_vel": [[0.06, 0.0, 9.0], []]},
+        [math.exp(-1.0), math.exp(-1.0 / (0.06**2 + 0.35**2))],
+    ),
+    "ang_vel_following": (
+        {"command": [[], [0, 0, -1.0]], "base_ang_vel": [[7.0, 7.0, 0.1], [0, 0, -0.5]]},
+        [math.exp(-1.0), math.exp(-0.25 / (0.1**2 + 0.35**2))],
+    ),
     "foot_drop_velocity": (
         {"phase": [[0.0, 1.0], [0, 0, 0, 0.5]], "foot_drop_sq": [[1.0, 2.0], [0, 0, 0, 3.0]]},
         [1.0 + 2.0 * math.e, 3.0 * math.exp(0.5)],
@@ -92,6 +101,14 @@ CASES = {
         },
         [1.0, 0.5, 0.5, 0.0, 0.0],
     ),
+    "feet_lifted": (
+        # All feet in the air; two of them, and none; two of them, but asked to move.
+        {
+            "command": [[], [0, 0, 0, 1.0], [], [0, 0, 0.1]],
+            "contact": [[], [1, 0, 0, 1], [1, 1, 1, 1], [1, 0, 0, 1]],
+        },
+        [4.0, 2.0, 0.0, 0.0],
+    ),
     "fall": ({"fallen": [False, True]}, [0.0, 1.0]),
 }
 
@@ -116,6 +133,8 @@ def test_a_function_gives_what_was_computed_by_hand(name):
     [
         ("lin_vel_tracking", {"sharpness": 2.0}, math.exp(-2.0)),
         ("ang_vel_tracking", {"sharpness": 8.0}, math.exp(-2.0)),
+        ("lin_vel_following", {"width": 0.5, "share": 1.0}, math.exp(-1.0 / 1.25)),
+        ("ang_vel_following", {"width": 1.0, "share": 2.0}, math.exp(-0.25 / 2.0)),
         ("near_ground_drop", {"depth": 0.05}, 3.0 * math.exp(-2.0)),
         ("base_height", {"desired": 0.5}, 0.25),
         ("foot_clearance", {"target": 0.2}, 0.01 + 3 * 0.04 * 0.0),
@@ -136,6 +155,8 @@ def test_a_parameter_changes_its_function(name, params, expected):
 
 def test_every_parameter_of_every_function_was_tried():
     tried = {("lin_vel_tracking", "sharpness"), ("ang_vel_tracking", "sharpness")}
+    following = ("lin_vel_following", "ang_vel_following")
+    tried |= {(name, key) for name in following for key in ("width", "share")}
     tried |= {("near_ground_drop", "depth"), ("base_height", "desired")}
     tried |= {("foot_clearance", "target"), ("touchdown_apex", "target")}
     assert tried == {
