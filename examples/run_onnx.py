@@ -5,7 +5,7 @@ the observation and the recurrent state all come from the metadata of the ONNX f
 Go1 whose joints have the names of the metadata will do: every actuator of a leg is made a position
 servo with the metadata's stiffness and damping, and keeps its torque limit.
 
-    python examples/run_onnx.py --policy policy.onnx --vx 0.5 --beta 0.7
+    python examples/run_onnx.py --policy policy.onnx --stand 3 --vx 0.5 --beta 0.7
 """
 
 from __future__ import annotations
@@ -23,9 +23,12 @@ import onnxruntime
 
 GO1 = Path(__file__).resolve().parents[1] / "resources" / "go1" / "go1.xml"
 RANGES = {"vx": (-2.0, 2.0), "vy": (-1.0, 1.0), "wz": (-2.0, 2.0), "beta": (0.0, 1.0)}
+MOTION = ("lin_vel_x", "lin_vel_y", "ang_vel_z")
 COMMAND_ARGUMENTS = {"lin_vel_x": "vx", "lin_vel_y": "vy", "ang_vel_z": "wz", "beta": "beta"}
 FALLEN = 0.5
 """Cosine of the trunk's tilt below which the robot counts as fallen."""
+GOING = 0.4
+"""Share of the command at which the robot counts as going."""
 
 
 class OnnxPolicy:
@@ -137,6 +140,11 @@ class Robot:
         return self._in_body_frame(self.data.qvel[self.root_vel : self.root_vel + 3])
 
     @property
+    def motion(self) -> np.ndarray:
+        """What commands are about: forward and sideways velocity, m/s, and yaw rate, rad/s."""
+        return np.append(self.velocity[:2], self.data.qvel[self.root_vel + 5])
+
+    @property
     def height(self) -> float:
         """Height of the trunk, m."""
         return float(self.data.qpos[self.root_pos + 2])
@@ -181,30 +189,57 @@ class Summary:
     """Least height of the trunk, m."""
     fallen: bool
     """Whether the trunk ever tipped over."""
+    followed: float
+    """Share of the command that was done in the last second; NaN where to stand was all."""
 
 
-def walk(policy: OnnxPolicy, robot: Robot, command: np.ndarray, seconds: float) -> Summary:
+def walk(
+    policy: OnnxPolicy, robot: Robot, command: dict[str, float], stand: float, seconds: float
+) -> Summary:
     """Let the policy drive the robot, and print how it goes once a second.
 
     Args:
         policy: The policy.
         robot: The robot.
-        command: Values in the order of the policy's `command_names`.
-        seconds: Simulated time.
+        command: What is asked for, by the policy's `command_names`.
+        stand: Time that it is asked to stand before, s; it counts for falls and height alone.
+        seconds: Time that it has for the command, s.
     """
+    standing = {name: value if name == "beta" else 0.0 for name, value in command.items()}
+    dt = policy.control_dt
+    before, after = round(stand / dt), max(1, round(seconds / dt))
     action = np.zeros(len(policy.joint_names))
-    speeds, heights, uprights = [], [], []
-    per_second = round(1.0 / policy.control_dt)
-    for step in range(1, max(1, round(seconds / policy.control_dt)) + 1):
-        action = policy.act(robot.observe(action, command))
+    motions, heights, uprights = [], [], []
+    per_second = round(1.0 / dt)
+    for step in range(1, before + after + 1):
+        asked = standing if step <= before else command
+        action = policy.act(robot.observe(action, np.array(list(asked.values()))))
         robot.step(policy.default_joint_pos + policy.action_scale * action)
-        speeds.append(float(robot.velocity[0]))
+        motions.append(robot.motion)
         heights.append(robot.height)
         uprights.append(robot.upright)
         if step % per_second == 0:
-            recent = np.mean(speeds[-per_second:])
-            print(f"{step * policy.control_dt:6.1f} s  {recent:6.3f} m/s  {heights[-1]:.3f} m")
-    return Summary(float(np.mean(speeds)), min(heights), min(uprights) < FALLEN)
+            recent = np.mean(motions[-per_second:], axis=0)[0]
+            print(f"{step * dt:6.1f} s  {recent:6.3f} m/s  {heights[-1]:.3f} m")
+    last = np.mean(motions[-min(per_second, after) :], axis=0)
+    speed = float(np.mean(motions[before:], axis=0)[0])
+    followed = _followed(np.array([command.get(name, 0.0) for name in MOTION]), last)
+    return Summary(speed, min(heights), min(uprights) < FALLEN, followed)
+
+
+def _followed(asked: np.ndarray, motion: np.ndarray) -> float:
+    """Return the share of what is asked that is done, of moving or turning whichever is less.
+
+    Args:
+        asked: Forward and sideways velocity, m/s, and yaw rate, rad/s. Shape: (3,).
+        motion: What was done of each. Shape: (3,).
+    """
+    shares = []
+    if asked[:2].any():
+        shares.append(float(asked[:2] @ motion[:2] / (asked[:2] @ asked[:2])))
+    if asked[2]:
+        shares.append(float(motion[2] / asked[2]))
+    return min(shares, default=math.nan)
 
 
 def main() -> int:
@@ -213,15 +248,20 @@ def main() -> int:
     try:
         _check(args)
         policy = OnnxPolicy(args.policy)
-        command = np.array([_command_value(args, name) for name in policy.command_names])
+        command = {name: _command_value(args, name) for name in policy.command_names}
         robot = Robot(args.model, policy)
     except ValueError as error:
         print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
-    summary = walk(policy, robot, command, args.seconds)
+    summary = walk(policy, robot, command, args.stand, args.seconds)
     print(f"mean forward speed: {summary.speed:.3f} m/s")
     print(f"min trunk height: {summary.min_height:.3f} m")
     print(f"fell: {'yes' if summary.fallen else 'no'}")
+    if not math.isnan(summary.followed):
+        goes = summary.followed >= GOING and not summary.fallen
+        print(
+            f"goes as asked: {'yes' if goes else 'no'} ({summary.followed:.0%} in the last second)"
+        )
     return 0
 
 
@@ -233,6 +273,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--vy", type=float, default=0.0, help="speed to the left, m/s")
     parser.add_argument("--wz", type=float, default=0.0, help="turning rate to the left, rad/s")
     parser.add_argument("--beta", type=float, default=0.0, help="quiet factor, 0 to 1")
+    parser.add_argument("--stand", type=float, default=0.0, help="time to stand before, s")
     parser.add_argument("--seconds", type=float, default=10.0, help="simulated time [%(default)s]")
     return parser.parse_args()
 
@@ -243,6 +284,8 @@ def _check(args: argparse.Namespace) -> None:
         value = getattr(args, name)
         if not low <= value <= high:
             raise ValueError(f"--{name} must be in [{low:g}, {high:g}], got {value}")
+    if not (args.stand >= 0.0 and math.isfinite(args.stand)):
+        raise ValueError(f"--stand must be >= 0, got {args.stand}")
     if not (args.seconds > 0.0 and math.isfinite(args.seconds)):
         raise ValueError(f"--seconds must be > 0, got {args.seconds}")
 

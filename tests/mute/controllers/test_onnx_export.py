@@ -6,6 +6,7 @@ import dataclasses
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -302,6 +303,33 @@ def test_the_example_walks_for_a_second(exported: Path):
     assert result.returncode == 0, result.stderr
     assert "mean forward speed: " in result.stdout
     assert "min trunk height: " in result.stdout
+
+
+def test_the_example_stands_before_it_goes_and_says_whether_it_goes_as_asked(exported: Path):
+    asked = ("--stand", "1", "--seconds", "1", "--vx", "0.4", "--wz", "0.2")
+    result = _run(str(EXAMPLE), "--policy", str(exported), *asked)
+    assert result.returncode == 0, result.stderr
+    assert [line.split(" s ")[0].strip() for line in result.stdout.splitlines()[:2]] == [
+        "1.0",
+        "2.0",
+    ]
+    assert re.search(r"^goes as asked: no \(-?\d+% in the last second\)$", result.stdout, re.M)
+    result = _run(str(EXAMPLE), "--policy", str(exported), "--seconds", "0.1", "--vx", "0")
+    assert "goes as asked" not in result.stdout  # to stand was all
+    result = _run(str(EXAMPLE), "--policy", str(exported), "--stand", "-1")
+    assert (result.returncode, result.stderr) == (2, "error: --stand must be >= 0, got -1.0\n")
+
+
+@pytest.mark.parametrize(
+    ("asked", "motion", "share"),
+    [
+        ((0.5, 0.0, 0.0), (0.25, 9.0, 9.0), 0.5),
+        ((0.0, 0.0, -0.5), (9.0, 9.0, -0.4), 0.8),
+        ((0.3, 0.4, 1.0), (0.3, 0.4, 0.1), 0.1),  # moves as asked, and hardly turns
+    ],
+)
+def test_the_example_tells_which_share_of_a_command_is_done(asked, motion, share):
+    assert _load_example()._followed(np.array(asked), np.array(motion)) == pytest.approx(share)
 
 
 def test_the_example_needs_neither_torch_nor_this_project():
