@@ -140,6 +140,9 @@ class AgentCfg:
     """Activation of actor and critic."""
     symmetric: bool = False
     """Whether the networks treat left and right alike, see `mute.networks.reflection`."""
+    leading_side: bool = False
+    """Whether symmetric networks may begin a step with one side, always the same: a robot that
+    stands level and still is its own mirror image, and no trot is."""
     init_std: float = 1.0
     """Standard deviation of the actions at the start."""
     std_range: tuple[float, float] = (0.05, 1.2)
@@ -175,6 +178,8 @@ class AgentCfg:
                 raise ValueError(f"agent.{name} must be one width at least, got ()")
         if self.symmetric:
             self._check_even_widths()
+        elif self.leading_side:
+            raise ValueError("agent.leading_side must be false unless agent.symmetric, got true")
         low, high = self.std_range
         if low > high:
             raise ValueError(

@@ -102,18 +102,29 @@ def tie_vector(vector: Tensor, reflection: Reflection) -> None:
     _tie(vector, (torch.tensor(reflection.index),), torch.tensor(reflection.sign), 0.5)
 
 
-def tie_mlp(layers: nn.Module, source: Reflection, target: Reflection) -> None:
+def tie_mlp(
+    layers: nn.Module, source: Reflection, target: Reflection, leading_side: bool = False
+) -> None:
     """Make a perceptron commute with the reflections of its input and output.
+
+    Args:
+        layers: The perceptron.
+        source: Reflection of the input.
+        target: Reflection of the output.
+        leading_side: Whether it may lead with one side, always the same: the bias of its first
+            layer stays free. That is as good as one more input that changes its sign in the
+            mirror, held at 1: what is its own mirror image in all else gets no mirrored answer.
 
     Raises:
         ValueError: If the width of a hidden layer is odd.
     """
     linear = [layer for layer in layers.modules() if isinstance(layer, nn.Linear)]
     for layer in linear:
-        last = layer is linear[-1]
+        first, last = layer is linear[0], layer is linear[-1]
         image = target if last else Reflection.swapped(layer.out_features)
         tie_layer(layer.weight, source, image)
-        tie_vector(layer.bias, image)
+        if not (first and leading_side):
+            tie_vector(layer.bias, image)
         source = image
 
 

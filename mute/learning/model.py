@@ -47,14 +47,19 @@ class PreparedModel(MLPModel):
             if isinstance(layer, nn.ELU | nn.ReLU | nn.SELU):
                 layer.inplace = True
 
-    def tie(self, source: Reflection, target: Reflection) -> None:
+    def tie(self, source: Reflection, target: Reflection, leading_side: bool = False) -> None:
         """Make it commute with the reflections of its input and output, now and as it learns.
+
+        Args:
+            source: Reflection of the input.
+            target: Reflection of the output.
+            leading_side: Whether it may lead with one side, see `tie_mlp`.
 
         Raises:
             ValueError: If the width of a hidden layer is odd.
         """
         self.reflection = source
-        tie_mlp(self.mlp, source, target)
+        tie_mlp(self.mlp, source, target, leading_side)
         if self.distribution is not None:
             for deviation in self.distribution.parameters():
                 tie_vector(deviation, target.unsigned)

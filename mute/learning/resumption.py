@@ -57,6 +57,7 @@ RULES: dict[str, Rule] = {
     "agent.critic_hidden": "kept",
     "agent.activation": "kept",
     "agent.symmetric": "kept",
+    "agent.leading_side": "kept",
     "agent.init_std": "kept",  # what has been learnt took its place
     "agent.std_range": "applied",
     "agent.matmul_precision": "applied",

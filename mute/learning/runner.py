@@ -109,7 +109,7 @@ class MuteRunner(OnPolicyRunner):
         self.alg.attach(estimated, trainer, self.ranks)
         if cfg.agent.symmetric:
             by_group = groups(env, estimator.cfg.latent_dim, estimation.actor_uses_phase)
-            tie_actor_critic(self.alg.actor, self.alg.critic, by_group)
+            tie_actor_critic(self.alg.actor, self.alg.critic, by_group, cfg.agent.leading_side)
         self.logger = TrainingLogger(
             log_dir=str(log_dir) if log_dir else None,
             cfg=self.cfg,

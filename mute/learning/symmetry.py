@@ -102,7 +102,10 @@ def tie_estimator(env: QuadrupedEnv, estimator: Estimator) -> None:
 
 
 def tie_actor_critic(
-    actor: PreparedModel, critic: PreparedModel, by_group: dict[str, Reflection]
+    actor: PreparedModel,
+    critic: PreparedModel,
+    by_group: dict[str, Reflection],
+    leading_side: bool = False,
 ) -> None:
     """Make actor and critic treat left and right alike, now and as they learn.
 
@@ -110,9 +113,11 @@ def tie_actor_critic(
         actor: The actor.
         critic: The critic.
         by_group: Reflection of each group that they see, from `groups`.
+        leading_side: Whether the actor may lead with one side, and the critic know that.
 
     Raises:
         ValueError: If the width of a layer is odd.
     """
     for model, target in ((actor, JOINTS), (critic, Reflection.unchanged(1))):
-        model.tie(Reflection.joined([by_group[name] for name in model.obs_groups]), target)
+        source = Reflection.joined([by_group[name] for name in model.obs_groups])
+        model.tie(source, target, leading_side)

@@ -16,10 +16,10 @@ SOURCE = Reflection((1, 0, 2, 3), (1.0, 1.0, -1.0, 1.0))
 TARGET = Reflection((0, 2, 1), (-1.0, -1.0, -1.0))
 
 
-def _make_mlp() -> nn.Sequential:
+def _make_mlp(leading_side: bool = False) -> nn.Sequential:
     torch.manual_seed(0)
     mlp = nn.Sequential(nn.Linear(4, 8), nn.ELU(), nn.Linear(8, 6), nn.ELU(), nn.Linear(6, 3))
-    tie_mlp(mlp, SOURCE, TARGET)
+    tie_mlp(mlp, SOURCE, TARGET, leading_side)
     return mlp
 
 
@@ -83,6 +83,33 @@ def test_it_goes_on_commuting_as_it_learns_what_does_not():
         losses.append(loss.item())
     assert losses[-1] < losses[0]
     _assert_commutes(mlp)
+
+
+def _step_out(mlp: nn.Module) -> torch.Tensor:
+    """Return what it says of what is its own mirror image, less the mirror image of that."""
+    alike = 0.5 * (torch.ones(4) + SOURCE(torch.ones(4)))
+    return mlp(alike) - TARGET(mlp(alike))
+
+
+def test_a_leading_side_gives_an_answer_that_is_not_its_own_mirror_image():
+    assert _step_out(_make_mlp()).abs().max() < 1e-6
+    assert _step_out(_make_mlp(leading_side=True)).abs().max() > 1e-3
+
+
+def test_with_a_leading_side_it_commutes_once_the_side_is_mirrored_too():
+    mlp = _make_mlp(leading_side=True)
+    optimizer = torch.optim.Adam(mlp.parameters(), lr=0.01, fused=True)
+    x, y = torch.randn(200, 4), torch.randn(200, 3)
+    for _ in range(50):
+        optimizer.zero_grad()
+        (mlp(x) - y).square().mean().backward()
+        optimizer.step()
+    image = copy.deepcopy(mlp)
+    first = image[0]
+    assert isinstance(first, nn.Linear)
+    with torch.no_grad():
+        first.bias.copy_(Reflection.swapped(8)(first.bias))
+    torch.testing.assert_close(image(SOURCE(x)), TARGET(mlp(x)))
 
 
 def test_the_tied_gradient_is_that_of_the_data_and_its_mirror_image():

@@ -200,3 +200,9 @@ def test_odd_widths_are_refused(field, value):
     dataclasses.replace(agent, **changes)
     with pytest.raises(ValueError, match=rf"agent\.(.*\.)?{field} must be even for agent.symmetr"):
         dataclasses.replace(agent, symmetric=True, **changes)
+
+
+def test_a_leading_side_needs_symmetric_networks():
+    AgentCfg(symmetric=True, leading_side=True)
+    with pytest.raises(ValueError, match=r"agent\.leading_side must be false unless agent\.symm"):
+        AgentCfg(leading_side=True)
