@@ -43,7 +43,7 @@ def test_fewer_than_six_values_have_no_interval(number: int):
 def test_intervals_of_skewed_times_hold_the_true_median_as_often_as_they_say(number: int):
     generator = np.random.default_rng(0)
     # Times with rare long ones, as a shared machine has them; the median of the log-normal is 2.
-    draws = 2.0 * np.exp(0.5 * generator.standard_normal((1000, number)))
+    draws = 2.0 * np.exp(0.5 * generator.standard_normal((2000, number)))
     held = 0
     for values in draws:
         interval = median_interval(values.tolist())
@@ -52,5 +52,5 @@ def test_intervals_of_skewed_times_hold_the_true_median_as_often_as_they_say(num
         held += interval.low <= 2.0 <= interval.high
     rank = {10: 2, 25: 8}[number]
     expected = 1.0 - 2.0 * binom.cdf(rank - 1, number, 0.5)
-    assert held / len(draws) == pytest.approx(expected, abs=0.02)
+    assert held / len(draws) == pytest.approx(expected, abs=0.015)
     assert expected >= 0.95
