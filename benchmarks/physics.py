@@ -36,7 +36,7 @@ from mute.envs.batch_simulation import BatchSimulation
 from mute.envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import randomize_physics
-from mute.envs.scene import LEGS, make_spec
+from mute.envs.scene import LEGS, add_contact_sensor, make_spec
 from mute.envs.sensors import sensor_slice
 from mute.envs.simulation import Simulation
 from mute.evaluation.intervals import median_interval
@@ -130,13 +130,7 @@ def _hips_collide(spec: mujoco.MjSpec) -> None:
             contype=0,
             conaffinity=1,
         )
-        spec.add_sensor(
-            name=f"{name}_contact",
-            type=mujoco.mjtSensor.mjSENS_CONTACT,
-            objtype=mujoco.mjtObj.mjOBJ_GEOM,
-            objname=name,
-            intprm=(1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1),
-        )
+        add_contact_sensor(spec, name)
 
 
 AS_IT_IS = Variant("as it is")

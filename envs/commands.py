@@ -51,6 +51,16 @@ class CommandsCfg:
         check_ranges(self, "env.commands", _RANGES)
         check_ordered(self, "env.commands", "lin_vel_x", "lin_vel_y", "ang_vel_z", "beta", "ramp")
 
+    def drawn_evenly(self, standing_fraction: float = 0.1) -> CommandsCfg:
+        """Return the same ranges, drawn from evenly whichever way a task does, to measure with.
+
+        Args:
+            standing_fraction: Share of the velocity commands that are zero.
+        """
+        return CommandsCfg(
+            self.lin_vel_x, self.lin_vel_y, self.ang_vel_z, self.beta, standing_fraction
+        )
+
 
 _RANGES = {
     "lin_vel_x": Range(-100.0, 100.0),

@@ -337,14 +337,19 @@ def _add_contact_sensors(spec: mujoco.MjSpec) -> None:
     feet = [f"{leg}_foot" for leg in LEGS]
     limbs = [f"{leg}_{part}" for leg in LEGS for part in ("thigh", "shank")]
     for geom in (*feet, "trunk", "head", *limbs):
-        spec.add_sensor(
-            name=f"{geom}_contact",
-            type=mujoco.mjtSensor.mjSENS_CONTACT,
-            objtype=mujoco.mjtObj.mjOBJ_GEOM,
-            objname=geom,
-            # What to report (found), how to choose among contacts (any), how many to report.
-            intprm=(1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1),
-        )
+        add_contact_sensor(spec, geom)
+
+
+def add_contact_sensor(spec: mujoco.MjSpec, geom: str) -> None:
+    """Add the number of contacts of a shape, as the sensor `GEOM_contact`."""
+    spec.add_sensor(
+        name=f"{geom}_contact",
+        type=mujoco.mjtSensor.mjSENS_CONTACT,
+        objtype=mujoco.mjtObj.mjOBJ_GEOM,
+        objname=geom,
+        # What to report (found), how to choose among contacts (any), how many to report.
+        intprm=(1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1),
+    )
 
 
 def _add_force_sensors(spec: mujoco.MjSpec) -> None:

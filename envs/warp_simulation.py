@@ -37,7 +37,7 @@ _STATE = (
 )
 """Arrays from which everything else follows, and readings that are older than they."""
 
-_FORWARDED = ("qacc_warmstart", "sensordata", "actuator_force", "overflow")
+_FORWARDED = ("sensordata", "actuator_force", "overflow")
 """Those of them that a forward pass may write."""
 
 _DERIVED = ("body_subtreemass", "body_invweight0", "dof_invweight0")

@@ -8,7 +8,7 @@ from typing import Any
 
 from mute.command_lines.benchmark_figures import CAPTIONS, PARTS, with_interval
 from mute.command_lines.card_physics import physics_section
-from mute.command_lines.card_tables import markdown
+from mute.command_lines.card_tables import cut_short, markdown
 from mute.command_lines.card_targets import targets_section
 
 __all__ = ["BenchmarkFiles", "benchmark_page"]
@@ -117,8 +117,7 @@ def _head() -> str:
 
 def _training(measured: Mapping[str, Any]) -> str:
     rows = [line for row in measured["rates"] for line in _lines(row)]
-    compared = "old" in measured["versions"]
-    against = " --against PYTHON:CHECKOUT" if compared else ""
+    against = _against(measured["versions"])
     parts = "\n".join(
         f"- {CAPTIONS[name]}: {sentence};" for name, sentence in measured["parts"].items()
     )
@@ -155,18 +154,13 @@ def _walking(measured: Mapping[str, Any]) -> str:
     for version in versions:
         for name, (caption, _) in _OF_A_WALK.items():
             columns[f"{version} {name}"] = (f"{version}: {caption}", "{}")
-    commits = " ".join(
-        f"{name.capitalize()} is commit {commit[:10]}{_changed(commit)}."
-        for name, commit in versions.items()
-    )
-    against = " --against PYTHON:CHECKOUT" if "old" in versions else ""
-    cut = f" The run was cut short: {measured['stopped']}." if measured["stopped"] else ""
+    commits = " ".join(f"{_commit(name, commit)}." for name, commit in versions.items())
     return (
         "## From nothing to a walk\n\n"
-        f"`python -m mute.benchmark --until-walking{measured['options']}{against} --out "
+        f"`python -m mute.benchmark --until-walking{measured['options']}{_against(versions)} --out "
         f"docs/walking.json` on {measured['machine']}, with a load average of "
         f"{measured['load_before']:.1f} from other work as it began: {measured['definition']}. "
-        f"{commits}{cut}\n\n"
+        f"{commits}{cut_short(measured['stopped'])}\n\n"
         f"{markdown(list(rows.values()), columns)}{''.join(_compared(measured))}"
     )
 
@@ -184,8 +178,7 @@ def _compared(measured: Mapping[str, Any]) -> Iterator[str]:
 
 def _lines(row: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the lines of one number of environments: new, old, and new over old."""
-    common = {"num_envs": row["num_envs"], "blocks": row.get("blocks")}
-    common["turns"] = row["turns"]
+    common = {name: row.get(name) for name in ("num_envs", "blocks", "turns")}
     yield common | {"version": "new"} | _cells(row, "{:,.0f}")
     if "old" in row:
         yield common | {"version": "old"} | _cells(row["old"], "{:,.0f}")
@@ -203,15 +196,21 @@ def _cells(figures: Mapping[str, Any], form: str) -> dict[str, str | None]:
 
 def _versions(versions: Mapping[str, Mapping[str, str]]) -> str:
     told = [
-        f"{name.capitalize()} is commit {each['commit'][:10]}{_changed(each['commit'])} with "
-        f"{each['engine']}, torch {each['torch']}, Python {each['python']}."
+        f"{_commit(name, each['commit'])} with {each['engine']}, "
+        f"torch {each['torch']}, Python {each['python']}."
         for name, each in versions.items()
     ]
     return " ".join(told)
 
 
-def _changed(commit: str) -> str:
-    return " (changed)" if commit.endswith("-dirty") else ""
+def _commit(name: str, commit: str) -> str:
+    """Return which commit a version is, in words."""
+    changed = " (changed)" if commit.endswith("-dirty") else ""
+    return f"{name.capitalize()} is commit {commit[:10]}{changed}"
+
+
+def _against(versions: Mapping[str, Any]) -> str:
+    return " --against PYTHON:CHECKOUT" if "old" in versions else ""
 
 
 def _precision(measured: Mapping[str, Any]) -> str:
@@ -221,8 +220,8 @@ def _precision(measured: Mapping[str, Any]) -> str:
         for row in measured["rates"]
         if row["not_precise"]
     ]
-    told += [f"The run was cut short: {measured['stopped']}."] if measured["stopped"] else []
-    return " ".join(told) + "\n\n" if told else ""
+    text = f"{' '.join(told)}{cut_short(measured['stopped'])}".strip()
+    return f"{text}\n\n" if text else ""
 
 
 def _peers(files: BenchmarkFiles) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mute.command_lines.card_tables import markdown
+from mute.command_lines.card_tables import cut_short, markdown
 
 __all__ = ["physics_section"]
 
@@ -33,14 +33,10 @@ def physics_section(measured: Mapping[str, Any]) -> str:
         "is that of control steps over the scene as it is, with its 95 % interval. The other "
         "columns tell how far a walk at 0.5 m/s without noise is from one with physics steps of "
         "0.5 ms, at beta 0 and at beta 1; a dash stands where a change leaves that walk as it "
-        f"is.{_cut_short(measured.get('stopped'))}\n\n"
+        f"is.{cut_short(measured.get('stopped'))}\n\n"
         f"{markdown(rows, _COLUMNS)}\n\n"
         f"{_touching(measured['touching'])}"
     )
-
-
-def _cut_short(stopped: str | None) -> str:
-    return f" The run was cut short: {stopped}." if stopped else ""
 
 
 def _cells(rate: Mapping[str, Any], fidelity: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import statistics
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["markdown", "mean_and_spread", "spread_of_trials", "times"]
+__all__ = ["cut_short", "markdown", "mean_and_spread", "spread_of_trials", "times"]
 
 
 def markdown(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, tuple[str, str]]) -> str:
@@ -25,6 +25,11 @@ def markdown(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, tuple[str,
         ]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
+
+
+def cut_short(stopped: str | None) -> str:
+    """Return what to say of a run that was stopped, with a space before it; nothing of others."""
+    return f" The run was cut short: {stopped}." if stopped else ""
 
 
 def mean_and_spread(values: Sequence[float], form: str) -> str:

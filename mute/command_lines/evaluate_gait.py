@@ -21,7 +21,7 @@ from mute.command_lines.arguments import (
 from mute.command_lines.policy_options import PolicyArgs
 from mute.controllers import LearnedController, load_policy
 from mute.controllers.learned import Policy
-from mute.envs.commands import BETA, CommandSampler, CommandsCfg
+from mute.envs.commands import BETA, CommandSampler
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.estimation_errors import EstimationMeter
 from mute.evaluation.matched_speed import sweep_beta_at_speed
@@ -173,8 +173,7 @@ def _draw_commands(env: QuadrupedEnv, seed: int) -> CommandSampler:
     How often the task draws slow ones, say, must not change what is measured.
     """
     generator = torch.Generator().manual_seed(seed)
-    own = env.cfg.commands
-    cfg = CommandsCfg(own.lin_vel_x, own.lin_vel_y, own.ang_vel_z, own.beta)
+    cfg = env.cfg.commands.drawn_evenly()
     draw = CommandSampler(cfg, env.num_envs, generator, torch.device("cpu"))
     draw.resample(torch.ones(env.num_envs, dtype=torch.bool), with_beta=True)
     return draw

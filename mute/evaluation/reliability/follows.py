@@ -100,10 +100,7 @@ def velocity_errors(policy: Policy, each: int, seed: int, on_work: OnWork) -> di
     env = make_env(randomized_cfg(policy, robots, _RANGE_TIME, seed))
     controller = LearnedController(policy, robots)
     setting = torch.arange(robots) % len(_BETAS)
-    ranges = policy.cfg.env.commands
-    sampler = _sampler(
-        CommandsCfg(ranges.lin_vel_x, ranges.lin_vel_y, ranges.ang_vel_z), robots, seed
-    )
+    sampler = _sampler(policy.cfg.env.commands.drawn_evenly(), robots, seed)
     command = _drawn(sampler, setting)
     meter = GaitMeter(env, _RANGE_SETTLE_TIME)
 
@@ -130,10 +127,7 @@ def stop_and_go_falls(policy: Policy, each: int, seed: int, on_work: OnWork) -> 
     env = make_env(randomized_cfg(policy, robots, _CHANGES * _CHANGE_TIME, seed))
     controller = LearnedController(policy, robots)
     setting = torch.arange(robots) % len(_BETAS)
-    ranges = policy.cfg.env.commands
-    cfg = CommandsCfg(
-        ranges.lin_vel_x, ranges.lin_vel_y, ranges.ang_vel_z, standing_fraction=_STOPPED_SHARE
-    )
+    cfg = policy.cfg.env.commands.drawn_evenly(_STOPPED_SHARE)
     sampler = _sampler(cfg, robots, seed)
     fallen = torch.zeros(robots, dtype=torch.bool)
 
