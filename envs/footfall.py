@@ -70,6 +70,7 @@ class Footfalls:
         """Shortest segment, in control steps."""
         self.max_steps = round(cfg.max_segment / step_dt)
         """Longest segment with a phase, in control steps."""
+        self._step_dt = step_dt
         self._decimation = decimation
         self._window = max(1, round(cfg.landing_window / timestep))
         # A landing is confirmed min_steps - 1 control steps late and looks back over its window.
@@ -105,6 +106,16 @@ class Footfalls:
     def touchdown(self) -> torch.Tensor:
         """Feet whose landing was confirmed in this control step, bool. Shape: (num_envs, 4)."""
         return self._contacts.touchdown
+
+    @property
+    def stride_time(self) -> torch.Tensor:
+        """Duration of the swing that `touchdown` ends and of the stance before it, s, else 0.
+
+        Of a stance that began with the episode nothing is known but what is usual. Shape:
+        (num_envs, 4).
+        """
+        steps = self._contacts.last_air_steps + self._contacts.last_stance_steps
+        return steps * self.touchdown * self._step_dt
 
     @property
     def phase(self) -> torch.Tensor:

@@ -55,6 +55,8 @@ class Motion:
     """Feet that landed, bool. Shape: (num_envs, 4)."""
     landing_speed: torch.Tensor
     """Landing speed of the feet that landed, else 0. Shape: (num_envs, 4)."""
+    stride_time: torch.Tensor
+    """Time since the last landing of the feet that landed, else 0, s. Shape: (num_envs, 4)."""
     swing_apex: torch.Tensor
     """Highest clearance of the current or last swing, m. Shape: (num_envs, 4)."""
     fallen: torch.Tensor

@@ -281,6 +281,7 @@ class QuadrupedEnv(VecEnv):
             contact=feet.contact,
             touchdown=feet.touchdown,
             landing_speed=feet.landing_speed,
+            stride_time=feet.stride_time,
             swing_apex=feet.swing_apex,
             fallen=self.fallen,
         )

@@ -343,6 +343,22 @@ def diagonal_support(motion: Motion) -> torch.Tensor:
     return 0.5 * difference.abs() * _asked_to_move(motion)
 
 
+@register_term(
+    "task",
+    period=Parameter(0.8, "time between a foot's landings up to which it earns, s", _POSITIVE),
+    target=Parameter(0.04, "apex from which on a swing earns in full, m", _POSITIVE),
+)
+def stepping(motion: Motion, period: float, target: float) -> torch.Tensor:
+    """Reward steps, as long as they lift the feet, and no kind of steps more than another.
+
+    Sum over the feet that land of min(stride time, period) min(apex / target, 1), while asked to
+    move; not in the paper. However often a foot lands, once a period or more, it earns the same: a
+    reward for air under the feet would shorten the landings, and one for each step hasten them.
+    """
+    earned = motion.stride_time.clamp(max=period) * (motion.swing_apex / target).clamp(max=1.0)
+    return earned.sum(dim=1) * _asked_to_move(motion)
+
+
 def _asked_to_move(motion: Motion) -> torch.Tensor:
     """Return which robots have a command other than to stand. Shape: (num_envs,)."""
     return (motion.command[:, :3] != 0.0).any(dim=1)

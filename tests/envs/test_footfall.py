@@ -45,7 +45,8 @@ def _play(footfalls, found, vel_z=None, clearance=None, foot=(0, 0)):
         heights = torch.zeros(num_envs, 4)
         heights[foot] = height
         footfalls.update(heights)
-        names = ("touchdown", "landing_speed", "swing_apex", "contact", "contact_share")
+        names = ("touchdown", "landing_speed", "stride_time", "swing_apex")
+        names += ("contact", "contact_share")
         results.append({name: getattr(footfalls, name)[foot].item() for name in names})
     return results
 
@@ -161,6 +162,15 @@ def test_the_apex_is_the_highest_clearance_of_the_swing_and_stays_in_stance():
     results = _play(footfalls, GROUND * 2 + AIR * 4 + GROUND * 3, clearance=first)
     assert [step["touchdown"] for step in results].index(True, 2) == 7
     assert [step["swing_apex"] for step in results[6:]] == pytest.approx([0.05] * 3)
+
+
+def test_a_stride_lasts_from_a_landing_to_the_next():
+    found = GROUND * 2 + AIR * 3 + GROUND * 5 + AIR * 4 + GROUND * 3
+    results = _play(_make_footfalls(), found)
+    strides = [step["stride_time"] for step in results if step["touchdown"]]
+    # Before the first landing, the stance is the one that the foot began in.
+    assert strides[-1] == pytest.approx((5 + 4) * 0.02)
+    assert all(step["stride_time"] == 0.0 for step in results if not step["touchdown"])
 
 
 def test_every_swing_has_its_own_apex():

@@ -109,6 +109,16 @@ CASES = {
         },
         [4.0, 2.0, 0.0, 0.0],
     ),
+    "stepping": (
+        # A whole period and high enough; half of one; too long to earn more, and half as high;
+        # still in the air. Asked to stand.
+        {
+            "command": [[0.0, 0.0, 0.1], [0, 0, 0, 1.0]],
+            "stride_time": [[0.8, 0.4, 2.0, 0.0], [0.8]],
+            "swing_apex": [[0.04, 0.06, 0.02, 0.05], [0.04]],
+        },
+        [0.8 + 0.4 + 0.4, 0.0],
+    ),
     "fall": ({"fallen": [False, True]}, [0.0, 1.0]),
 }
 
@@ -139,6 +149,8 @@ def test_a_function_gives_what_was_computed_by_hand(name):
         ("base_height", {"desired": 0.5}, 0.25),
         ("foot_clearance", {"target": 0.2}, 0.01 + 3 * 0.04 * 0.0),
         ("touchdown_apex", {"target": 0.1}, 0.4),
+        ("stepping", {"period": 0.3}, 0.3),
+        ("stepping", {"target": 0.12}, 0.25),
     ],
 )
 def test_a_parameter_changes_its_function(name, params, expected):
@@ -146,6 +158,7 @@ def test_a_parameter_changes_its_function(name, params, expected):
         command=[[1.0, 0.0, 0.5], []],
         touchdown=[[1], []],
         swing_apex=[[0.06], []],
+        stride_time=[[0.5], []],
         foot_height=[[0.1], []],
         foot_drop_sq=[[3.0], []],
         foot_speed_xy=[[1.0], []],
@@ -159,6 +172,7 @@ def test_every_parameter_of_every_function_was_tried():
     tried |= {(name, key) for name in following for key in ("width", "share")}
     tried |= {("near_ground_drop", "depth"), ("base_height", "desired")}
     tried |= {("foot_clearance", "target"), ("touchdown_apex", "target")}
+    tried |= {("stepping", "period"), ("stepping", "target")}
     assert tried == {
         (name, key) for name, function in REWARD_FUNCTIONS.items() for key in function.parameters
     }

@@ -26,6 +26,7 @@ WIDTHS = {
     "contact": 4,
     "touchdown": 4,
     "landing_speed": 4,
+    "stride_time": 4,
     "swing_apex": 4,
 }
 
