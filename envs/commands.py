@@ -8,7 +8,7 @@ import torch
 
 from mute.support.ranges import Range, check_ordered, check_ranges
 
-__all__ = ["CommandSampler", "CommandsCfg"]
+__all__ = ["BETA", "CommandSampler", "CommandsCfg"]
 
 BETA = 3
 """Column of the quiet factor in the command tensor."""
@@ -34,6 +34,9 @@ class CommandsCfg:
     """Share of them that are slow."""
     slow_share: float = 0.3
     """Share of the velocity ranges that slow ones are drawn from."""
+    deadband: float = 0.0
+    """Size of a velocity command, (v_x, v_y, w_z) in m/s and rad/s taken together, below which it
+    is made zero: nobody can tell whether a robot follows it, or whether it should stand."""
     resampling_time: float = 10.0
     """Time between new velocity commands within an episode, s."""
     initial_share: float = 1.0
@@ -71,6 +74,7 @@ _RANGES = {
     "single_axis_fraction": Range(0.0, 1.0),
     "slow_fraction": Range(0.0, 1.0),
     "slow_share": Range(0.0, 1.0),
+    "deadband": Range(0.0, 100.0),
     "resampling_time": Range(0.0, 1e12, above=True),
     "initial_share": Range(0.0, 1.0),
     "ramp": Range(0.0, 1e12),
@@ -122,6 +126,8 @@ class CommandSampler:
         if shaped:
             self._shape(velocity, draw[:, 5:])
         standing = draw[:, 4] < cfg.standing_fraction
+        if cfg.deadband > 0.0:
+            standing |= velocity.square().sum(dim=1) < cfg.deadband**2
         velocity.masked_fill_(standing.unsqueeze(1), 0.0)
         if not with_beta:
             fresh[:, BETA] = self.command[:, BETA]

@@ -72,6 +72,20 @@ def test_the_asked_share_of_the_commands_is_slow():
     assert slow.float().mean().item() == pytest.approx(0.5 + 0.5 * 0.2**3, abs=0.025)
 
 
+def test_commands_too_small_to_follow_are_made_zero_and_no_others_change():
+    whole, clear = (
+        _make_sampler(4000, standing_fraction=0.0, slow_fraction=0.5, deadband=deadband)
+        for deadband in (0.0, 0.2)
+    )
+    for sampler in (whole, clear):
+        _resample_all(sampler)
+    small = whole.command[:, :3].norm(dim=1) < 0.2
+    assert 0.02 < small.float().mean().item() < 0.5
+    assert (clear.command[small, :3] == 0.0).all()
+    assert torch.equal(clear.command[~small], whole.command[~small])
+    assert torch.equal(clear.beta, whole.beta)
+
+
 def test_turning_on_the_spot_is_not_standing():
     sampler = _make_sampler(2)
     sampler.command[:] = torch.tensor([[0.0, 0.0, 0.1, 0.0], [0.0, 0.0, 0.0, 1.0]])
