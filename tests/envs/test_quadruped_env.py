@@ -478,6 +478,22 @@ def test_the_guide_leaves_the_reward_with_the_simulated_time():
     assert shares[-1] == 0.0
 
 
+def test_steps_are_paid_for_by_the_time_since_the_foot_landed_last():
+    terms = {"stepping": reward_term("stepping", 2.0, period=0.5, target=0.02)}
+    env = _make_env(2, rewards=RewardsCfg(terms=terms), **CALM)
+    env.set_command(torch.tensor([0.5, 0.0, 0.0, 0.0]))
+    lift = torch.zeros(2, 12)
+    lift[:, [1, 2, 10, 11]] = torch.tensor([4.0, -4.0, 4.0, -4.0])  # FR and RL drawn up
+    paid = []
+    for step in range(40):
+        # Up for four steps of ten.
+        paid.append(env.step(lift if step % 10 >= 6 else torch.zeros(2, 12))[1])
+    # The two feet of each robot land every 0.2 s, in one step of ten.
+    steps = torch.stack(paid[20:])
+    assert (steps > 0.0).sum(dim=0).tolist() == [2, 2]
+    torch.testing.assert_close(steps.sum(dim=0), torch.full((2,), 2 * 2 * 0.2 * 2.0 * env.step_dt))
+
+
 def test_without_a_ramp_there_is_no_guide():
     assert _make_env(1).curriculum.guide == 0.0
 
