@@ -311,13 +311,17 @@ def stand_still(motion: Motion) -> torch.Tensor:
     return motion.joint_pos.abs().sum(dim=1) * standing
 
 
-@register_term("lift")
-def feet_lifted(motion: Motion) -> torch.Tensor:
+@register_term(
+    "lift", speed=Parameter(0.2, "speed of the trunk at which 1/e of it is left, m/s", _POSITIVE)
+)
+def feet_lifted(motion: Motion, speed: float) -> torch.Tensor:
     """Count the feet off the ground while asked to stand; not in the paper.
 
-    Marching on the spot keeps the stance on average, and is no silence.
+    Marching on the spot keeps the stance on average, and is no silence. Times
+    exp(-(|v_xy| / speed)^2): a robot that still moves, or was pushed, has to step lest it falls.
     """
-    return (~motion.contact).sum(dim=1).float() * ~_asked_to_move(motion)
+    lifted = (~motion.contact).sum(dim=1).float() * ~_asked_to_move(motion)
+    return lifted * torch.exp(-motion.base_lin_vel[:, :2].square().sum(dim=1) / speed**2)
 
 
 @register_term("lift")

@@ -484,10 +484,9 @@ def test_steps_are_paid_for_by_the_time_since_the_foot_landed_last():
     env.set_command(torch.tensor([0.5, 0.0, 0.0, 0.0]))
     lift = torch.zeros(2, 12)
     lift[:, [1, 2, 10, 11]] = torch.tensor([4.0, -4.0, 4.0, -4.0])  # FR and RL drawn up
-    paid = []
-    for step in range(40):
-        # Up for four steps of ten.
-        paid.append(env.step(lift if step % 10 >= 6 else torch.zeros(2, 12))[1])
+    stand = torch.zeros_like(lift)
+    # Up for four steps of ten.
+    paid = [env.step(lift if step % 10 >= 6 else stand)[1] for step in range(40)]
     # The two feet of each robot land every 0.2 s, in one step of ten.
     steps = torch.stack(paid[20:])
     assert (steps > 0.0).sum(dim=0).tolist() == [2, 2]

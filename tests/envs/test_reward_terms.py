@@ -102,12 +102,14 @@ CASES = {
         [1.0, 0.5, 0.5, 0.0, 0.0],
     ),
     "feet_lifted": (
-        # All feet in the air; two of them, and none; two of them, but asked to move.
+        # All feet in the air; two of them, and none; two of them, but asked to move; one, still
+        # moving.
         {
-            "command": [[], [0, 0, 0, 1.0], [], [0, 0, 0.1]],
-            "contact": [[], [1, 0, 0, 1], [1, 1, 1, 1], [1, 0, 0, 1]],
+            "command": [[], [0, 0, 0, 1.0], [], [0, 0, 0.1], []],
+            "contact": [[], [1, 0, 0, 1], [1, 1, 1, 1], [1, 0, 0, 1], [1, 0, 1, 1]],
+            "base_lin_vel": [[0, 0, 9.0], [], [], [], [0.0, 0.2]],
         },
-        [4.0, 2.0, 0.0, 0.0],
+        [4.0, 2.0, 0.0, 0.0, math.exp(-1.0)],
     ),
     "stepping": (
         # A whole period and high enough; half of one; too long to earn more, and half as high;
@@ -166,13 +168,19 @@ def test_a_parameter_changes_its_function(name, params, expected):
     assert _value(name, motion, **params)[0].item() == pytest.approx(expected)
 
 
+def test_the_speed_up_to_which_lifted_feet_count_is_a_parameter():
+    motion = make_motion(base_lin_vel=[[0.3, -0.4], []])
+    values = _value("feet_lifted", motion, speed=0.5).tolist()
+    assert values == pytest.approx([4.0 * math.exp(-1.0), 4.0])
+
+
 def test_every_parameter_of_every_function_was_tried():
     tried = {("lin_vel_tracking", "sharpness"), ("ang_vel_tracking", "sharpness")}
     following = ("lin_vel_following", "ang_vel_following")
     tried |= {(name, key) for name in following for key in ("width", "share")}
     tried |= {("near_ground_drop", "depth"), ("base_height", "desired")}
     tried |= {("foot_clearance", "target"), ("touchdown_apex", "target")}
-    tried |= {("stepping", "period"), ("stepping", "target")}
+    tried |= {("stepping", "period"), ("stepping", "target"), ("feet_lifted", "speed")}
     assert tried == {
         (name, key) for name, function in REWARD_FUNCTIONS.items() for key in function.parameters
     }
