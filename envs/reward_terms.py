@@ -135,14 +135,13 @@ _SHARPNESS = "inverse of the squared error at which 1/e of it is left"
 @register_term("task", sharpness=Parameter(4.0, f"{_SHARPNESS}, s^2/m^2", _POSITIVE))
 def lin_vel_tracking(motion: Motion, sharpness: float) -> torch.Tensor:
     """Reward the commanded horizontal velocity: exp(-sharpness |v_xy^cmd - v_xy|^2)."""
-    error = (motion.command[:, :2] - motion.base_lin_vel[:, :2]).square().sum(dim=1)
-    return torch.exp(-sharpness * error)
+    return torch.exp(-sharpness * _lin_vel_error_sq(motion))
 
 
 @register_term("task", sharpness=Parameter(4.0, f"{_SHARPNESS}, s^2/rad^2", _POSITIVE))
 def ang_vel_tracking(motion: Motion, sharpness: float) -> torch.Tensor:
     """Reward the commanded yaw rate: exp(-sharpness (w_z^cmd - w_z)^2)."""
-    return torch.exp(-sharpness * (motion.command[:, 2] - motion.base_ang_vel[:, 2]).square())
+    return torch.exp(-sharpness * _ang_vel_error_sq(motion))
 
 
 _SHARE = Parameter(0.35, "share of the commanded speed by which the width grows", Range(0.0, 10.0))
@@ -159,9 +158,8 @@ def lin_vel_following(motion: Motion, width: float, share: float) -> torch.Tenso
     exp(-|v_xy^cmd - v_xy|^2 / (width^2 + share^2 |v_xy^cmd|^2)); not in the paper, whose term pays
     96 % of its reward for standing when 0.1 m/s is asked for.
     """
-    asked = motion.command[:, :2]
-    error = (asked - motion.base_lin_vel[:, :2]).square().sum(dim=1)
-    return torch.exp(-error / (width**2 + share**2 * asked.square().sum(dim=1)))
+    asked_sq = motion.command[:, :2].square().sum(dim=1)
+    return torch.exp(-_lin_vel_error_sq(motion) / (width**2 + share**2 * asked_sq))
 
 
 @register_term(
@@ -174,9 +172,8 @@ def ang_vel_following(motion: Motion, width: float, share: float) -> torch.Tenso
 
     exp(-(w_z^cmd - w_z)^2 / (width^2 + share^2 (w_z^cmd)^2)); not in the paper.
     """
-    asked = motion.command[:, 2]
-    error = (asked - motion.base_ang_vel[:, 2]).square()
-    return torch.exp(-error / (width**2 + share**2 * asked.square()))
+    asked_sq = motion.command[:, 2].square()
+    return torch.exp(-_ang_vel_error_sq(motion) / (width**2 + share**2 * asked_sq))
 
 
 @register_term("phase")
@@ -294,7 +291,7 @@ def touchdown_apex(motion: Motion, target: float) -> torch.Tensor:
 
     Sum over the feet that land of max(1 - apex / target, 0), while asked to move.
     """
-    missing = (1.0 - motion.swing_apex / target).clamp(min=0.0)
+    missing = 1.0 - _lift_share(motion, target)
     return (missing * motion.touchdown).sum(dim=1) * _asked_to_move(motion)
 
 
@@ -359,8 +356,23 @@ def stepping(motion: Motion, period: float, target: float) -> torch.Tensor:
     move; not in the paper. However often a foot lands, once a period or more, it earns the same: a
     reward for air under the feet would shorten the landings, and one for each step hasten them.
     """
-    earned = motion.stride_time.clamp(max=period) * (motion.swing_apex / target).clamp(max=1.0)
+    earned = motion.stride_time.clamp(max=period) * _lift_share(motion, target)
     return earned.sum(dim=1) * _asked_to_move(motion)
+
+
+def _lin_vel_error_sq(motion: Motion) -> torch.Tensor:
+    """Return |v_xy^cmd - v_xy|^2, (m/s)^2. Shape: (num_envs,)."""
+    return (motion.command[:, :2] - motion.base_lin_vel[:, :2]).square().sum(dim=1)
+
+
+def _ang_vel_error_sq(motion: Motion) -> torch.Tensor:
+    """Return (w_z^cmd - w_z)^2, (rad/s)^2. Shape: (num_envs,)."""
+    return (motion.command[:, 2] - motion.base_ang_vel[:, 2]).square()
+
+
+def _lift_share(motion: Motion, target: float) -> torch.Tensor:
+    """Return what of a target, in m, each swing's apex reaches, at most 1. Shape: (num_envs, 4)."""
+    return (motion.swing_apex / target).clamp(max=1.0)
 
 
 def _asked_to_move(motion: Motion) -> torch.Tensor:
