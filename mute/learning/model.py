@@ -57,8 +57,9 @@ class PreparedModel(MLPModel):
         self.prepared_group = f"prepared for {obs_set}"
         """Name of the observation group that holds the input ready made."""
         if self.obs_normalization:
-            bent = _VELOCITY_COMMAND if command_knee > 0.0 else slice(0, 0)
-            self.obs_normalizer = RunningNormalization(self.obs_dim, bent=bent, knee=command_knee)
+            self.obs_normalizer = RunningNormalization(
+                self.obs_dim, bent=_VELOCITY_COMMAND, knee=command_knee
+            )
         for layer in self.mlp:
             if isinstance(layer, nn.ELU | nn.ReLU | nn.SELU):
                 layer.inplace = True

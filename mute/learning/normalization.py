@@ -19,7 +19,7 @@ class RunningNormalization(nn.Module):
     """A normaliser that takes an input in blocks of columns, and may learn its mirror image too."""
 
     def __init__(
-        self, width: int, eps: float = 1e-2, bent: slice = slice(0, 0), knee: float = 1.0
+        self, width: int, eps: float = 1e-2, bent: slice = slice(0, 0), knee: float = 0.0
     ) -> None:
         """Begin with a mean of 0 and a variance of 1, which count as no samples.
 
@@ -27,7 +27,7 @@ class RunningNormalization(nn.Module):
             width: Width of the input.
             eps: What is added to the deviations before the input is divided by them.
             bent: Columns x that are taken as asinh(x / knee), before anything else.
-            knee: Where that turns from a straight line to a logarithm.
+            knee: Where that turns from a straight line to a logarithm; 0 leaves them as they are.
         """
         super().__init__()
         self.eps = eps
@@ -85,8 +85,8 @@ class RunningNormalization(nn.Module):
         self._take_on(count, mean[None], _sum_of_ranks_(share * torch.cat(squares))[None])
 
     def _bend(self, x: Tensor) -> Tensor:
-        """Return the input with its bent columns, itself where there are none."""
-        if self._bent_from == self._bent_to:
+        """Return the input with its bent columns, itself where nothing bends them."""
+        if self.knee == 0.0:
             return x
         before, after = x[:, : self._bent_from], x[:, self._bent_to :]
         bent = torch.asinh(x[:, self._bent_from : self._bent_to] / self.knee)
