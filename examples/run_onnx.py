@@ -205,15 +205,15 @@ def walk(
         stand: Time that it is asked to stand before, s; it counts for falls and height alone.
         seconds: Time that it has for the command, s.
     """
-    standing = {name: value if name == "beta" else 0.0 for name, value in command.items()}
+    walking = np.array(list(command.values()))
+    standing = np.where([name == "beta" for name in command], walking, 0.0)
     dt = policy.control_dt
     before, after = round(stand / dt), max(1, round(seconds / dt))
     action = np.zeros(len(policy.joint_names))
     motions, heights, uprights = [], [], []
     per_second = round(1.0 / dt)
     for step in range(1, before + after + 1):
-        asked = standing if step <= before else command
-        action = policy.act(robot.observe(action, np.array(list(asked.values()))))
+        action = policy.act(robot.observe(action, standing if step <= before else walking))
         robot.step(policy.default_joint_pos + policy.action_scale * action)
         motions.append(robot.motion)
         heights.append(robot.height)
