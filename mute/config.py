@@ -143,10 +143,10 @@ class AgentCfg:
     leading_side: bool = False
     """Whether symmetric networks may begin a step with one side, always the same: a robot that
     stands level and still is its own mirror image, and no trot is."""
-    command_knee: float = 0.0
-    """Velocity command, m/s and rad/s, above which actor and critic see it on a logarithmic scale,
-    asinh(command / knee): a step is taken whole or not at all, at 0.1 m/s as at 1, and a network
-    that sees 0.1 as next to nothing stands. 0 leaves the scale straight."""
+    go_signal: bool = False
+    """Whether actor and critic see, beside the command, whether it is one to move: a step is taken
+    whole or not at all, at 0.1 m/s as at 1, and a network that sees 0.1 as next to nothing
+    stands."""
     init_std: float = 1.0
     """Standard deviation of the actions at the start."""
     std_range: tuple[float, float] = (0.05, 1.2)
@@ -173,7 +173,6 @@ class AgentCfg:
             "noise_interval": Range(0, 10**9, whole=True),
             "actor_hidden": _WIDTH,
             "critic_hidden": _WIDTH,
-            "command_knee": Range(0.0, 100.0),
             "init_std": _POSITIVE,
             "std_range": _POSITIVE,
         }
@@ -212,20 +211,20 @@ class AgentCfg:
             "class_name": "mute.learning.model:PreparedModel",
             "activation": self.activation,
             "obs_normalization": True,
-            "command_knee": self.command_knee,
         }
         distribution = {
             "class_name": "mute.learning.distribution:SharedGaussian",
             "init_std": self.init_std,
             "std_range": self.std_range,
         }
+        seen = ["policy", "estimate", *(["go"] if self.go_signal else [])]
         return {
             "num_steps_per_env": self.num_steps_per_env,
             "check_for_nan": False,  # see `EstimatorPPO.process_env_step`
             "save_interval": self.save_interval,
             "obs_groups": {
-                "actor": ["policy", "estimate"],
-                "critic": ["policy", "estimate", "privileged"],
+                "actor": seen,
+                "critic": [*seen, "privileged"],
             },
             "actor": network | {"hidden_dims": self.actor_hidden, "distribution_cfg": distribution},
             "critic": network | {"hidden_dims": self.critic_hidden},

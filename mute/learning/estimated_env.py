@@ -1,7 +1,7 @@
 """The estimator in the loop: an environment that also publishes what is estimated of it.
 
-rsl_rl sees one more observation group, `estimate`; its PPO and its models stay as they are, and no
-policy gradient can reach the estimator.
+rsl_rl sees two more observation groups, `estimate` and `go`; its PPO and its models stay as they
+are, and no policy gradient can reach the estimator.
 """
 
 from __future__ import annotations
@@ -13,13 +13,19 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from mute.config import TaskCfg
-from mute.envs.observations import OBS_DIM
+from mute.envs.commands import BETA
+from mute.envs.observations import OBS_DIM, OBSERVATION_WIDTHS, slices
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.networks.estimator import Estimate, Estimator, State
 from mute.support.threads import use_collection_threads, use_learning_threads
 
-__all__ = ["EstimatedEnv", "estimate_group", "make_estimator"]
+__all__ = ["EstimatedEnv", "estimate_group", "go_group", "make_estimator"]
+
+_COMMAND = slices(OBSERVATION_WIDTHS)["command"]
+_VELOCITY_COMMAND = slice(_COMMAND.start, _COMMAND.start + BETA)
+_SLOWEST = 0.01
+"""Size of a velocity command, m/s and rad/s taken together, that rounding alone does not make."""
 
 
 def make_estimator(cfg: TaskCfg) -> Estimator:
@@ -44,6 +50,19 @@ def estimate_group(estimate: Estimate, estimator: Estimator, with_phase: bool) -
     """
     parts = [estimate.base_lin_vel, estimator.normalised(estimate.heights), estimate.latent]
     return torch.cat([*parts, estimate.phase] if with_phase else parts, dim=-1)
+
+
+def go_group(obs: torch.Tensor) -> torch.Tensor:
+    """Return the observation group `go`: 1 for robots that are asked to move, 0 to stand.
+
+    Args:
+        obs: The group `policy`. Shape: (num_envs, OBS_DIM).
+
+    Returns:
+        Shape (num_envs, 1).
+    """
+    size_sq = obs[:, _VELOCITY_COMMAND].square().sum(dim=-1, keepdim=True)
+    return (size_sq > _SLOWEST**2).to(obs.dtype)
 
 
 class EstimatedEnv(VecEnv):
@@ -170,4 +189,5 @@ class EstimatedEnv(VecEnv):
         self._estimate, self.state = self.estimator.step(observations["policy"], state_before)
         groups = dict(observations.items())
         groups["estimate"] = estimate_group(self._estimate, self.estimator, self.with_phase)
+        groups["go"] = go_group(observations["policy"])
         self._observations = TensorDict(groups, batch_size=[self.num_envs], device=self.device)

@@ -10,17 +10,11 @@ from rsl_rl.modules import HiddenState
 from tensordict import TensorDict
 from torch import nn
 
-from mute.envs.commands import BETA
-from mute.envs.observations import OBSERVATION_WIDTHS, slices
 from mute.learning.normalization import RunningNormalization
 from mute.networks.reflection import Reflection, tie_mlp, tie_vector
 from mute.support.precision import hidden_dtype, hidden_layers
 
 __all__ = ["PreparedModel"]
-
-_COMMAND = slices(OBSERVATION_WIDTHS)["command"]
-_VELOCITY_COMMAND = slice(_COMMAND.start, _COMMAND.start + BETA)
-"""Columns of the velocity commands in the group `policy`, which comes first."""
 
 
 class PreparedModel(MLPModel):
@@ -38,28 +32,17 @@ class PreparedModel(MLPModel):
         obs_groups: dict[str, list[str]],
         obs_set: str,
         *args: Any,  # noqa: ANN401
-        command_knee: float = 0.0,
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
         """Build the networks, see `MLPModel`.
 
         Activations work in place, since nothing else reads what they are given.
-
-        Args:
-            obs: Observations, of which the shapes are taken.
-            obs_groups: Names of the groups that each network sees.
-            obs_set: Which of these networks this is.
-            args: What `MLPModel` takes besides.
-            command_knee: See `AgentCfg.command_knee`.
-            kwargs: What `MLPModel` takes besides.
         """
         super().__init__(obs, obs_groups, obs_set, *args, **kwargs)
         self.prepared_group = f"prepared for {obs_set}"
         """Name of the observation group that holds the input ready made."""
         if self.obs_normalization:
-            self.obs_normalizer = RunningNormalization(
-                self.obs_dim, bent=_VELOCITY_COMMAND, knee=command_knee
-            )
+            self.obs_normalizer = RunningNormalization(self.obs_dim)
         for layer in self.mlp:
             if isinstance(layer, nn.ELU | nn.ReLU | nn.SELU):
                 layer.inplace = True

@@ -18,21 +18,15 @@ __all__ = ["RunningNormalization"]
 class RunningNormalization(nn.Module):
     """A normaliser that takes an input in blocks of columns, and may learn its mirror image too."""
 
-    def __init__(
-        self, width: int, eps: float = 1e-2, bent: slice = slice(0, 0), knee: float = 0.0
-    ) -> None:
+    def __init__(self, width: int, eps: float = 1e-2) -> None:
         """Begin with a mean of 0 and a variance of 1, which count as no samples.
 
         Args:
             width: Width of the input.
             eps: What is added to the deviations before the input is divided by them.
-            bent: Columns x that are taken as asinh(x / knee), before anything else.
-            knee: Where that turns from a straight line to a logarithm; 0 leaves them as they are.
         """
         super().__init__()
         self.eps = eps
-        # TorchScript knows no slices.
-        self._bent_from, self._bent_to, self.knee = int(bent.start), int(bent.stop), float(knee)
         # TorchScript cannot read such types in the body of the class.
         self._mean: Tensor
         self._var: Tensor
@@ -56,15 +50,14 @@ class RunningNormalization(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Return the input normalised. Shapes: (num_samples, width)."""
-        return torch.sub(self._bend(x), self._mean).div_(self._std + self.eps)
+        return torch.sub(x, self._mean).div_(self._std + self.eps)
 
     @torch.no_grad()
     def update(self, x: Tensor, *more: Tensor) -> None:
         """Learn the mean and variance of an input, over all ranks; in training mode alone.
 
         Args:
-            x: The input, or its first columns, those that are bent among them. Shape:
-                (num_samples, width).
+            x: The input, or its first columns. Shape: (num_samples, width).
             more: The columns that follow. Shapes: (num_samples, width of each).
 
         Raises:
@@ -72,7 +65,7 @@ class RunningNormalization(nn.Module):
         """
         if not self.training:
             return
-        blocks = [block.to(self._mean) for block in (self._bend(x), *more)]
+        blocks = [block.to(self._mean) for block in (x, *more)]
         num_samples = len(x)
         if any(len(block) != num_samples for block in blocks):
             lengths = [len(block) for block in blocks]
@@ -83,14 +76,6 @@ class RunningNormalization(nn.Module):
         parts = zip(blocks, mean.split([block.shape[1] for block in blocks]), strict=True)
         squares = [(block - part).square_().mean(dim=0) for block, part in parts]
         self._take_on(count, mean[None], _sum_of_ranks_(share * torch.cat(squares))[None])
-
-    def _bend(self, x: Tensor) -> Tensor:
-        """Return the input with its bent columns, itself where nothing bends them."""
-        if self.knee == 0.0:
-            return x
-        before, after = x[:, : self._bent_from], x[:, self._bent_to :]
-        bent = torch.asinh(x[:, self._bent_from : self._bent_to] / self.knee)
-        return torch.cat((before, bent, after), dim=1)
 
     @torch.no_grad()
     def include_mirror_image(self, reflection: Reflection) -> None:

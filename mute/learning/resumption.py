@@ -58,7 +58,7 @@ RULES: dict[str, Rule] = {
     "agent.activation": "kept",
     "agent.symmetric": "kept",
     "agent.leading_side": "kept",
-    "agent.command_knee": "kept",
+    "agent.go_signal": "kept",
     "agent.init_std": "kept",  # what has been learnt took its place
     "agent.std_range": "applied",
     "agent.matmul_precision": "applied",

@@ -88,6 +88,7 @@ def groups(env: QuadrupedEnv, latent_dim: int, with_phase: bool) -> dict[str, Re
     return {
         "policy": OBSERVATION,
         "privileged": Reflection.joined([parts[name] for name in env.privileged_slices]),
+        "go": Reflection.unchanged(1),
         "estimate": Reflection.joined([*estimate, FEET] if with_phase else estimate),
     }
 

@@ -38,16 +38,13 @@ EXAMPLE = REPOSITORY / "examples" / "run_onnx.py"
 HIDDEN = 24
 
 
-def _make_cfg(actor_uses_phase: bool = True, command_knee: float = 0.0) -> TaskCfg:
+def _make_cfg(actor_uses_phase: bool = True, go_signal: bool = False) -> TaskCfg:
     estimation = EstimationCfg(
         network=EstimatorCfg(lstm_hidden=HIDDEN, latent_dim=5, phase_hidden=(8,)),
         actor_uses_phase=actor_uses_phase,
     )
     agent = AgentCfg(
-        actor_hidden=(16, 8),
-        critic_hidden=(8,),
-        command_knee=command_knee,
-        estimation=estimation,
+        actor_hidden=(16, 8), critic_hidden=(8,), go_signal=go_signal, estimation=estimation
     )
     env = QuadrupedEnvCfg(
         num_envs=4,
@@ -164,15 +161,14 @@ def test_a_policy_whose_actor_ignores_the_phase_is_reproduced_too(tmp_path: Path
     _assert_same_outputs(policy, tmp_path / "policy.onnx", steps=20)
 
 
-def test_a_policy_that_sees_commands_on_a_bent_scale_is_reproduced_too(
-    policy: Policy, tmp_path: Path
-):
-    bent = load_policy(_write_checkpoint(tmp_path / "bent.pt", _make_cfg(command_knee=0.1)))
-    export_policy(bent, tmp_path / "bent.onnx")
-    _assert_same_outputs(bent, tmp_path / "bent.onnx", steps=20)
-    observations = QuadrupedEnv(policy.cfg.env).get_observations()
-    actions = [LearnedController(each, 4).act(observations) for each in (policy, bent)]
-    assert not torch.allclose(*actions, rtol=0.0, atol=1e-2)  # the weights are the same
+@pytest.mark.parametrize("standing", [0.0, 1.0])
+def test_a_policy_that_is_told_whether_to_go_is_reproduced_too(tmp_path: Path, standing: float):
+    cfg = _make_cfg(go_signal=True)
+    commands = dataclasses.replace(cfg.env.commands, standing_fraction=standing)
+    cfg = dataclasses.replace(cfg, env=dataclasses.replace(cfg.env, commands=commands))
+    policy = load_policy(_write_checkpoint(tmp_path / "told.pt", cfg))
+    export_policy(policy, tmp_path / "told.onnx")
+    _assert_same_outputs(policy, tmp_path / "told.onnx", steps=20)
 
 
 def test_two_robots_driven_by_torch_and_by_onnx_stay_together(policy: Policy, exported: Path):

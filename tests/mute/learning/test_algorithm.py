@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
@@ -11,6 +12,7 @@ from learning_helpers import (
     NUM_STEPS,
     before_each_update,
     clone_tree,
+    make_cfg,
     make_runner,
 )
 from quick_products import use_bfloat16
@@ -18,6 +20,7 @@ from rsl_rl.algorithms import PPO
 from rsl_rl.storage import RolloutStorage
 
 from mute.learning.estimated_env import estimate_group
+from mute.learning.runner import MuteRunner
 
 
 def _starts(alg) -> torch.Tensor:
@@ -204,14 +207,18 @@ def test_the_two_optimisers_share_no_parameter_and_leave_none_out():
     assert not ppo & estimator
 
 
-def test_actor_and_critic_read_the_groups_they_are_meant_to():
-    runner = make_runner()
+@pytest.mark.parametrize("go", [[], ["go"]])
+def test_actor_and_critic_read_the_groups_they_are_meant_to(go):
+    cfg = make_cfg()
+    agent = dataclasses.replace(cfg.agent, go_signal=bool(go))
+    runner = MuteRunner("go1_mute", dataclasses.replace(cfg, agent=agent), None)
     observations = runner.env.get_observations()
     widths = {name: observations[name].shape[1] for name in observations.keys()}  # noqa: SIM118
-    assert runner.alg.actor.obs_groups == ["policy", "estimate"]
-    assert runner.alg.critic.obs_groups == ["policy", "estimate", "privileged"]
-    assert runner.alg.actor.obs_dim == widths["policy"] + widths["estimate"]
-    assert runner.alg.critic.obs_dim == sum(widths.values())
+    assert widths["go"] == 1
+    assert runner.alg.actor.obs_groups == ["policy", "estimate", *go]
+    assert runner.alg.critic.obs_groups == ["policy", "estimate", *go, "privileged"]
+    for network in (runner.alg.actor, runner.alg.critic):
+        assert network.obs_dim == sum(widths[name] for name in network.obs_groups)
 
 
 def test_the_stored_observation_is_the_one_acted_on():

@@ -6,7 +6,7 @@ import pytest
 import torch
 from tensordict import TensorDict
 
-from mute.learning.estimated_env import EstimatedEnv, estimate_group
+from mute.learning.estimated_env import EstimatedEnv, estimate_group, go_group
 from mute.networks.estimator import Estimate, Estimator, EstimatorCfg
 
 NUM_ENVS, OBS_DIM, NUM_HEIGHTS = 3, 5, 4
@@ -78,6 +78,14 @@ def test_the_group_is_velocity_normalised_heights_latent_and_phase_in_this_order
     expected = torch.tensor([[1.0, 2.0, 3.0, 0.0, 1.5, 5.0, 6.0, 0.1, 0.2, 0.3, 0.4]])
     assert torch.allclose(estimate_group(estimate, estimator, with_phase=True), expected)
     assert torch.allclose(estimate_group(estimate, estimator, with_phase=False), expected[:, :7])
+
+
+def test_the_signal_to_go_is_given_by_every_velocity_command_but_none():
+    obs = torch.ones(6, 46)
+    obs[:, 42:45] = torch.tensor(
+        [[0, 0, 0], [1e-4, 0, 0], [0.02, 0, 0], [0, -0.02, 0], [0, 0, 1.0], [-1.0, 0.5, 0]]
+    )
+    assert go_group(obs).tolist() == [[0.0], [0.0], [1.0], [1.0], [1.0], [1.0]]
 
 
 @pytest.mark.parametrize(("with_phase", "width"), [(True, 3 + 4 + 2 + 4), (False, 3 + 4 + 2)])

@@ -10,7 +10,6 @@ from quick_products import use_bfloat16
 from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 
-from mute.envs.observations import OBS_DIM, OBSERVATION_WIDTHS, slices
 from mute.learning.model import PreparedModel
 from mute.networks.reflection import Reflection
 
@@ -149,25 +148,3 @@ def test_an_input_ready_made_gives_what_the_observations_give_in_bfloat16(monkey
     ready = TensorDict({critic.prepared_group: critic.prepared(obs)}, batch_size=200)
     assert ready[critic.prepared_group].dtype == torch.bfloat16
     torch.testing.assert_close(critic(ready), critic(obs), rtol=0.0, atol=1e-6)
-
-
-def _make_commanded(knee):
-    """Return an actor that sees nothing but the observation, and observations of two robots."""
-    torch.manual_seed(0)
-    obs = TensorDict({"policy": torch.randn(2, OBS_DIM)}, batch_size=2)
-    settings = {"obs_normalization": True, "command_knee": knee}
-    return PreparedModel(obs, {"actor": ["policy"]}, "actor", 4, (16, 8), **settings), obs
-
-
-def test_velocity_commands_alone_are_seen_on_a_bent_scale():
-    model, obs = _make_commanded(0.1)
-    command = slices(OBSERVATION_WIDTHS)["command"]
-    seen = model.get_latent(obs) * 1.01  # what the normaliser divides by before it learns
-    expected = obs["policy"].clone()
-    expected[:, command][:, :3] = (obs["policy"][:, command][:, :3] / 0.1).asinh()
-    torch.testing.assert_close(seen, expected)
-
-
-def test_commands_are_seen_straight_without_a_knee():
-    model, obs = _make_commanded(0.0)
-    torch.testing.assert_close(model.get_latent(obs) * 1.01, obs["policy"])

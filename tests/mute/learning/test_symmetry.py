@@ -16,7 +16,7 @@ from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
 from mute.envs.terrain import HeightMapCfg
-from mute.learning.estimated_env import estimate_group
+from mute.learning.estimated_env import estimate_group, go_group
 from mute.learning.runner import MuteRunner
 from mute.learning.symmetry import FEET, JOINTS, OBSERVATION, POLAR, groups, heights
 from mute.networks.estimator import EstimatorCfg
@@ -123,6 +123,7 @@ def test_all_networks_commute_with_the_mirror_after_learning(runner):
             if mirror:
                 parts = {name: reflections[name](part) for name, part in parts.items()}
             parts["estimate"] = estimate_group(seen, estimator, with_phase=True)
+            parts["go"] = go_group(parts["policy"])
             views.append(TensorDict(parts, batch_size=[20]))
         actions = [runner.alg.actor(view) for view in views]
         values = [runner.alg.critic(view) for view in views]
@@ -134,6 +135,7 @@ def test_all_networks_commute_with_the_mirror_after_learning(runner):
     close(FEET(estimate.phase), image.phase)
     close(OBSERVATION(decoded[0]), decoded[1])
     close(reflections["estimate"](views[0]["estimate"]), views[1]["estimate"])
+    close(reflections["go"](views[0]["go"]), views[1]["go"])
     close(JOINTS(actions[0]), actions[1], atol=1e-5, rtol=1e-4)
     close(values[0], values[1], atol=1e-5, rtol=1e-4)
     assert actions[0].std() > 0.001
