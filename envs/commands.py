@@ -26,6 +26,9 @@ class CommandsCfg:
     """Yaw rate, rad/s."""
     beta: tuple[float, float] = (0.0, 1.0)
     """Quiet factor; 0 asks for speed, 1 for silence."""
+    beta_end_fraction: float = 0.0
+    """Share of the episodes whose beta is an end of its range, each end as often as the other:
+    robots that differ a little at both learn to differ much."""
     standing_fraction: float = 0.1
     """Share of the velocity commands that are zero."""
     single_axis_fraction: float = 0.0
@@ -61,7 +64,11 @@ class CommandsCfg:
             standing_fraction: Share of the velocity commands that are zero.
         """
         return CommandsCfg(
-            self.lin_vel_x, self.lin_vel_y, self.ang_vel_z, self.beta, standing_fraction
+            lin_vel_x=self.lin_vel_x,
+            lin_vel_y=self.lin_vel_y,
+            ang_vel_z=self.ang_vel_z,
+            beta=self.beta,
+            standing_fraction=standing_fraction,
         )
 
 
@@ -70,6 +77,7 @@ _RANGES = {
     "lin_vel_y": Range(-100.0, 100.0),
     "ang_vel_z": Range(-100.0, 100.0),
     "beta": Range(0.0, 1.0),
+    "beta_end_fraction": Range(0.0, 1.0),
     "standing_fraction": Range(0.0, 1.0),
     "single_axis_fraction": Range(0.0, 1.0),
     "slow_fraction": Range(0.0, 1.0),
@@ -120,6 +128,8 @@ class CommandSampler:
         shaped = cfg.slow_fraction > 0.0 or cfg.single_axis_fraction > 0.0
         size = self.command.shape[0], 8 if shaped else 5
         draw = torch.rand(size, generator=self.generator, device=mask.device)
+        if cfg.beta_end_fraction > 0.0:
+            draw[:, BETA] = _to_ends(draw[:, BETA], cfg.beta_end_fraction)
         fresh = self._low + self._span * draw[:, :4]
         velocity = fresh[:, :BETA]
         velocity *= cfg.initial_share + (1.0 - cfg.initial_share) * progress
@@ -146,3 +156,10 @@ class CommandSampler:
         axis = (draw[:, 2:] * BETA).long()
         others = torch.arange(BETA, device=axis.device) != axis
         velocity.masked_fill_(alone.unsqueeze(1) & others, 0.0)
+
+
+def _to_ends(draw: torch.Tensor, fraction: float) -> torch.Tensor:
+    """Return numbers in [0, 1] of which a fraction are 0 or 1, from even ones."""
+    if fraction == 1.0:
+        return draw.round()
+    return ((draw - 0.5 * fraction) / (1.0 - fraction)).clamp(0.0, 1.0)

@@ -50,6 +50,21 @@ def test_a_standing_robot_has_no_velocity_but_a_beta():
     assert (sampler.beta >= 0.25).all()
 
 
+@pytest.mark.parametrize("fraction", [0.4, 1.0])
+def test_the_asked_share_of_the_betas_is_an_end_of_their_range(fraction):
+    sampler = _make_sampler(4000, beta_end_fraction=fraction, **RANGES)
+    _resample_all(sampler)
+    for end in (0.25, 0.75):
+        # Standard deviation of the share: at most sqrt(1 / 4 / 4000) = 0.008.
+        share = (sampler.beta == end).float().mean().item()
+        assert share == pytest.approx(0.5 * fraction, abs=0.03)
+    between = sampler.beta[(sampler.beta > 0.25) & (sampler.beta < 0.75)]
+    if fraction < 1.0:
+        # Even between the ends: mean 0.5, deviation 0.5 / sqrt(12); of the mean 0.003.
+        assert between.mean().item() == pytest.approx(0.5, abs=0.015)
+        assert between.std().item() == pytest.approx(0.5 / math.sqrt(12.0), abs=0.01)
+
+
 def test_the_asked_share_of_the_commands_has_a_single_axis_each_as_often_as_any():
     sampler = _make_sampler(6000, standing_fraction=0.0, single_axis_fraction=0.6)
     _resample_all(sampler)
