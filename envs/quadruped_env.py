@@ -263,6 +263,7 @@ class QuadrupedEnv(VecEnv):
             command=self.commands.command,
             base_lin_vel=self.base_lin_vel,
             base_ang_vel=self.base_ang_vel,
+            velocity_error=self._averaged_velocity_error(),
             projected_gravity=self.projected_gravity,
             base_height=self.base_pos[:, 2] - self.terrain.height(self.base_pos[:, :2]),
             joint_pos=self.joint_pos,
@@ -285,6 +286,13 @@ class QuadrupedEnv(VecEnv):
             swing_apex=feet.swing_apex,
             fallen=self.fallen,
         )
+
+    def _averaged_velocity_error(self) -> torch.Tensor:
+        """Take this step into the average of the velocity error. Shape: (num_envs, 3)."""
+        velocity = torch.cat((self.base_lin_vel[:, :2], self.base_ang_vel[:, 2:]), dim=1)
+        error = self.commands.command[:, :3] - velocity
+        self.velocity_error = self.velocity_error.lerp(error, self._following_share)
+        return self.velocity_error
 
     def _clearance(self) -> torch.Tensor:
         """Return the air between each foot and the ground, m. Shape: (num_envs, 4)."""
@@ -380,6 +388,11 @@ class QuadrupedEnv(VecEnv):
         num_envs, device = self.num_envs, self.device
         zeros = torch.zeros(num_envs, NUM_ACTIONS, device=device)
         self.action = self.last_action = self.action_before_last = self.last_joint_vel = zeros
+        self.velocity_error = torch.zeros(num_envs, 3, device=device)
+        """What is missing to the commanded (v_x, v_y, w_z), averaged over
+        `RewardsCfg.following_time`, m/s and rad/s. Shape: (num_envs, 3)."""
+        time = self.cfg.rewards.following_time
+        self._following_share = -math.expm1(-self.step_dt / time) if time else 1.0
         self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long, device=device)
         nobody = torch.zeros(num_envs, dtype=torch.bool, device=device)
         self.fallen = nobody
@@ -395,5 +408,5 @@ class QuadrupedEnv(VecEnv):
         self._estimated_phase = torch.zeros(num_envs, len(LEGS), device=device)
 
 
-_PAST = ("action", "last_action", "action_before_last", "last_joint_vel")
+_PAST = ("action", "last_action", "action_before_last", "last_joint_vel", "velocity_error")
 _STATE_TENSORS = (*_PAST, "episode_length_buf", "_estimated_phase", "physics")

@@ -155,11 +155,12 @@ _SHARE = Parameter(0.35, "share of the commanded speed by which the width grows"
 def lin_vel_following(motion: Motion, width: float, share: float) -> torch.Tensor:
     """Reward the commanded horizontal velocity, as sharply when it is slow as when it is fast.
 
-    exp(-|v_xy^cmd - v_xy|^2 / (width^2 + share^2 |v_xy^cmd|^2)); not in the paper, whose term pays
-    96 % of its reward for standing when 0.1 m/s is asked for.
+    exp(-|e_xy|^2 / (width^2 + share^2 |v_xy^cmd|^2)) of the averaged error e; not in the paper,
+    whose term pays 96 % of its reward for standing when 0.1 m/s is asked for.
     """
     asked_sq = motion.command[:, :2].square().sum(dim=1)
-    return torch.exp(-_lin_vel_error_sq(motion) / (width**2 + share**2 * asked_sq))
+    error_sq = motion.velocity_error[:, :2].square().sum(dim=1)
+    return torch.exp(-error_sq / (width**2 + share**2 * asked_sq))
 
 
 @register_term(
@@ -170,10 +171,11 @@ def lin_vel_following(motion: Motion, width: float, share: float) -> torch.Tenso
 def ang_vel_following(motion: Motion, width: float, share: float) -> torch.Tensor:
     """Reward the commanded yaw rate, as sharply when it is slow as when it is fast.
 
-    exp(-(w_z^cmd - w_z)^2 / (width^2 + share^2 (w_z^cmd)^2)); not in the paper.
+    exp(-e_z^2 / (width^2 + share^2 (w_z^cmd)^2)) of the averaged error e; not in the paper.
     """
     asked_sq = motion.command[:, 2].square()
-    return torch.exp(-_ang_vel_error_sq(motion) / (width**2 + share**2 * asked_sq))
+    error_sq = motion.velocity_error[:, 2].square()
+    return torch.exp(-error_sq / (width**2 + share**2 * asked_sq))
 
 
 @register_term("phase")
@@ -344,11 +346,11 @@ def diagonal_support(motion: Motion) -> torch.Tensor:
     return 0.5 * difference.abs() * _asked_to_move(motion)
 
 
-@register_term(
-    "task",
-    period=Parameter(0.8, "time between a foot's landings up to which it earns, s", _POSITIVE),
-    target=Parameter(0.04, "apex from which on a swing earns in full, m", _POSITIVE),
-)
+_PERIOD = Parameter(0.8, "time between a foot's landings up to which it earns, s", _POSITIVE)
+_FULL_APEX = Parameter(0.04, "apex from which on a swing earns in full, m", _POSITIVE)
+
+
+@register_term("task", period=_PERIOD, target=_FULL_APEX)
 def stepping(motion: Motion, period: float, target: float) -> torch.Tensor:
     """Reward steps, as long as they lift the feet, and no kind of steps more than another.
 
@@ -356,7 +358,23 @@ def stepping(motion: Motion, period: float, target: float) -> torch.Tensor:
     move; not in the paper. However often a foot lands, once a period or more, it earns the same: a
     reward for air under the feet would shorten the landings, and one for each step hasten them.
     """
-    earned = motion.stride_time.clamp(max=period) * _lift_share(motion, target)
+    return _step_time(motion, period, target).sum(dim=1) * _asked_to_move(motion)
+
+
+@register_term(
+    "phase",
+    speed=Parameter(0.4, "landing speed at which 1/e of it is left, m/s", _POSITIVE),
+    period=_PERIOD,
+    target=_FULL_APEX,
+)
+def soft_steps(motion: Motion, speed: float, period: float, target: float) -> torch.Tensor:
+    """Reward steps as `stepping` does, the more the softer they land.
+
+    Its share of each landing is exp(-(landing speed / speed)^2); not in the paper. A penalty on
+    landings is cut by landing seldom, and most by standing; this one is earned by soft steps alone.
+    """
+    softness = torch.exp(-motion.landing_speed.square() / speed**2)
+    earned = _step_time(motion, period, target) * softness
     return earned.sum(dim=1) * _asked_to_move(motion)
 
 
@@ -373,6 +391,11 @@ def _ang_vel_error_sq(motion: Motion) -> torch.Tensor:
 def _lift_share(motion: Motion, target: float) -> torch.Tensor:
     """Return what of a target, in m, each swing's apex reaches, at most 1. Shape: (num_envs, 4)."""
     return (motion.swing_apex / target).clamp(max=1.0)
+
+
+def _step_time(motion: Motion, period: float, target: float) -> torch.Tensor:
+    """Return what each step earns, s: its stride time by its lift. Shape: (num_envs, 4)."""
+    return motion.stride_time.clamp(max=period) * _lift_share(motion, target)
 
 
 def _asked_to_move(motion: Motion) -> torch.Tensor:

@@ -80,6 +80,10 @@ class RewardsCfg:
     """How much of the task reward beta = 1 gives up (paper, section II-C)."""
     phase_source: Literal["estimated", "true"] = "estimated"
     """'estimated' (the paper's) or 'true' (the causal phase, for ablation)."""
+    following_time: float = 0.0
+    """Time constant, s, with which the velocity error is averaged that the following terms read: a
+    trunk speeds up and slows down with every step, and what is asked for is its mean. With 0 it is
+    that of the moment."""
     quiet_ramp: tuple[float, float] = (0.0, 0.0)
     """Seconds of simulated time per environment between which the phase group's weight grows from
     0 to 1: a full-strength quiet term from the first step teaches the robot to stand still."""
@@ -114,7 +118,13 @@ class RewardsCfg:
 
 
 _RAMP = Range(0.0, 1e12)
-_RANGES = {"k": Range(0.0, 1.0), "quiet_ramp": _RAMP, "lift_ramp": _RAMP, "guide_ramp": _RAMP}
+_RANGES = {
+    "k": Range(0.0, 1.0),
+    "following_time": Range(0.0, 1e6),
+    "quiet_ramp": _RAMP,
+    "lift_ramp": _RAMP,
+    "guide_ramp": _RAMP,
+}
 _WEIGHT = Range(-1e9, 1e9)
 
 

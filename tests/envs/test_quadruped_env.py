@@ -493,6 +493,24 @@ def test_steps_are_paid_for_by_the_time_since_the_foot_landed_last():
     torch.testing.assert_close(steps.sum(dim=0), torch.full((2,), 2 * 2 * 0.2 * 2.0 * env.step_dt))
 
 
+@pytest.mark.parametrize("time", [0.0, 0.1])
+def test_the_velocity_error_is_averaged_over_the_time_that_is_asked_for(time):
+    env = _make_env(2, rewards=RewardsCfg(following_time=time), **CALM)
+    env.set_command(torch.tensor([0.5, -0.2, 0.3, 1.0]))
+    share = 1.0 - math.exp(-env.step_dt / time) if time else 1.0
+    expected = torch.zeros(2, 3)
+    for step in range(12):
+        if step == 8:
+            env.reset(torch.tensor([False, True]))
+            env.set_command(torch.tensor([0.5, -0.2, 0.3, 1.0]))
+            expected[1] = 0.0
+        env.step(torch.zeros(2, 12))
+        velocity = torch.cat((env.base_lin_vel[:, :2], env.base_ang_vel[:, 2:]), dim=1)
+        expected += share * (torch.tensor([0.5, -0.2, 0.3]) - velocity - expected)
+        torch.testing.assert_close(env.velocity_error, expected)
+    assert float(env.velocity_error.abs().max()) > 0.1
+
+
 def test_without_a_ramp_there_is_no_guide():
     assert _make_env(1).curriculum.guide == 0.0
 

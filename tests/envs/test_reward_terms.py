@@ -25,11 +25,11 @@ CASES = {
     ),
     # Nothing asked for and one width too fast; 0.6 and 0.8 m/s asked for, and standing.
     "lin_vel_following": (
-        {"command": [[], [0.6, 0.8]], "base_lin_vel": [[0.06, 0.0, 9.0], []]},
+        {"command": [[], [0.6, 0.8]], "velocity_error": [[-0.06, 0.0, 9.0], [0.6, 0.8]]},
         [math.exp(-1.0), math.exp(-1.0 / (0.06**2 + 0.35**2))],
     ),
     "ang_vel_following": (
-        {"command": [[], [0, 0, -1.0]], "base_ang_vel": [[7.0, 7.0, 0.1], [0, 0, -0.5]]},
+        {"command": [[], [0, 0, -1.0]], "velocity_error": [[7.0, 7.0, 0.1], [0, 0, -0.5]]},
         [math.exp(-1.0), math.exp(-0.25 / (0.1**2 + 0.35**2))],
     ),
     "foot_drop_velocity": (
@@ -121,6 +121,17 @@ CASES = {
         },
         [0.8 + 0.4 + 0.4, 0.0],
     ),
+    "soft_steps": (
+        # As softly as can be; at the speed that leaves 1/e, too long, and half as high; in the air.
+        # Asked to stand.
+        {
+            "command": [[0.0, 0.0, 0.1], [0, 0, 0, 1.0]],
+            "stride_time": [[0.4, 2.0, 0.0], [0.8]],
+            "landing_speed": [[0.0, 0.4, 0.0], [0.1]],
+            "swing_apex": [[0.04, 0.02, 0.05], [0.04]],
+        },
+        [0.4 + 0.4 * math.exp(-1.0), 0.0],
+    ),
     "fall": ({"fallen": [False, True]}, [0.0, 1.0]),
 }
 
@@ -153,14 +164,19 @@ def test_a_function_gives_what_was_computed_by_hand(name):
         ("touchdown_apex", {"target": 0.1}, 0.4),
         ("stepping", {"period": 0.3}, 0.3),
         ("stepping", {"target": 0.12}, 0.25),
+        ("soft_steps", {"speed": 0.2}, 0.5 * math.exp(-1.0)),
+        ("soft_steps", {"period": 0.3}, 0.3 * math.exp(-0.25)),
+        ("soft_steps", {"target": 0.12}, 0.25 * math.exp(-0.25)),
     ],
 )
 def test_a_parameter_changes_its_function(name, params, expected):
     motion = make_motion(
         command=[[1.0, 0.0, 0.5], []],
+        velocity_error=[[1.0, 0.0, 0.5], []],
         touchdown=[[1], []],
         swing_apex=[[0.06], []],
         stride_time=[[0.5], []],
+        landing_speed=[[0.2], []],
         foot_height=[[0.1], []],
         foot_drop_sq=[[3.0], []],
         foot_speed_xy=[[1.0], []],
@@ -181,6 +197,7 @@ def test_every_parameter_of_every_function_was_tried():
     tried |= {("near_ground_drop", "depth"), ("base_height", "desired")}
     tried |= {("foot_clearance", "target"), ("touchdown_apex", "target")}
     tried |= {("stepping", "period"), ("stepping", "target"), ("feet_lifted", "speed")}
+    tried |= {("soft_steps", key) for key in ("speed", "period", "target")}
     assert tried == {
         (name, key) for name, function in REWARD_FUNCTIONS.items() for key in function.parameters
     }

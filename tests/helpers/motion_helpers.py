@@ -10,6 +10,7 @@ WIDTHS = {
     "command": 4,
     "base_lin_vel": 3,
     "base_ang_vel": 3,
+    "velocity_error": 3,
     "projected_gravity": 3,
     "joint_pos": 12,
     "joint_vel": 12,
