@@ -290,7 +290,10 @@ class QuadrupedEnv(VecEnv):
     def _averaged_velocity_error(self) -> torch.Tensor:
         """Take this step into the average of the velocity error. Shape: (num_envs, 3)."""
         velocity = torch.cat((self.base_lin_vel[:, :2], self.base_ang_vel[:, 2:]), dim=1)
-        error = self.commands.command[:, :3] - velocity
+        ahead = self.commands.command[:, :3] - self.velocity_reference
+        limit = self._reference_step
+        self.velocity_reference = self.velocity_reference + ahead.clamp(-limit, limit)
+        error = self.velocity_reference - velocity
         self.velocity_error = self.velocity_error.lerp(error, self._following_share)
         return self.velocity_error
 
@@ -391,6 +394,11 @@ class QuadrupedEnv(VecEnv):
         self.velocity_error = torch.zeros(num_envs, 3, device=device)
         """What is missing to the commanded (v_x, v_y, w_z), averaged over
         `RewardsCfg.following_time`, m/s and rad/s. Shape: (num_envs, 3)."""
+        self.velocity_reference = torch.zeros(num_envs, 3, device=device)
+        """(v_x, v_y, w_z) that the following terms ask for, m/s and rad/s: the command, but for
+        `RewardsCfg.following_acceleration`. Shape: (num_envs, 3)."""
+        acceleration = self.cfg.rewards.following_acceleration
+        self._reference_step = acceleration * self.step_dt if acceleration else math.inf
         time = self.cfg.rewards.following_time
         self._following_share = -math.expm1(-self.step_dt / time) if time else 1.0
         self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long, device=device)
@@ -408,5 +416,12 @@ class QuadrupedEnv(VecEnv):
         self._estimated_phase = torch.zeros(num_envs, len(LEGS), device=device)
 
 
-_PAST = ("action", "last_action", "action_before_last", "last_joint_vel", "velocity_error")
+_PAST = (
+    "action",
+    "last_action",
+    "action_before_last",
+    "last_joint_vel",
+    "velocity_error",
+    "velocity_reference",
+)
 _STATE_TENSORS = (*_PAST, "episode_length_buf", "_estimated_phase", "physics")

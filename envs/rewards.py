@@ -84,6 +84,10 @@ class RewardsCfg:
     """Time constant, s, with which the velocity error is averaged that the following terms read: a
     trunk speeds up and slows down with every step, and what is asked for is its mean. With 0 it is
     that of the moment."""
+    following_acceleration: float = 0.0
+    """Acceleration, m/s^2 and rad/s^2 along each axis, with which the velocity that the following
+    terms ask for goes from one command to the next; with 0 at once. A robot that is paid for
+    turning back from full speed at once takes falls into the bargain."""
     quiet_ramp: tuple[float, float] = (0.0, 0.0)
     """Seconds of simulated time per environment between which the phase group's weight grows from
     0 to 1: a full-strength quiet term from the first step teaches the robot to stand still."""
@@ -121,6 +125,7 @@ _RAMP = Range(0.0, 1e12)
 _RANGES = {
     "k": Range(0.0, 1.0),
     "following_time": Range(0.0, 1e6),
+    "following_acceleration": Range(0.0, 1e6),
     "quiet_ramp": _RAMP,
     "lift_ramp": _RAMP,
     "guide_ramp": _RAMP,

@@ -511,6 +511,27 @@ def test_the_velocity_error_is_averaged_over_the_time_that_is_asked_for(time):
     assert float(env.velocity_error.abs().max()) > 0.1
 
 
+def test_what_is_followed_goes_from_command_to_command_with_the_acceleration_that_is_asked_for():
+    env = _make_env(2, rewards=RewardsCfg(following_acceleration=5.0), **CALM)
+    commands = torch.tensor([[0.25, -0.3, 0.0, 0.0], [-0.05, 0.0, 0.1, 0.0]])
+    seen = []
+    for command in commands:
+        env.set_command(command)
+        for _ in range(4):
+            env.step(torch.zeros(2, 12))
+            velocity = torch.cat((env.base_lin_vel[:, :2], env.base_ang_vel[:, 2:]), dim=1)
+            torch.testing.assert_close(env.velocity_error, env.velocity_reference - velocity)
+            seen.append(env.velocity_reference[0])
+    expected = [
+        *([0.1, -0.1, 0.0], [0.2, -0.2, 0.0], [0.25, -0.3, 0.0], [0.25, -0.3, 0.0]),
+        *([0.15, -0.2, 0.1], [0.05, -0.1, 0.1], [-0.05, 0.0, 0.1], [-0.05, 0.0, 0.1]),
+    ]
+    torch.testing.assert_close(torch.stack(seen), torch.tensor(expected))
+    env.reset(torch.tensor([True, False]))
+    assert env.velocity_reference[0].abs().max() == 0.0
+    torch.testing.assert_close(env.velocity_reference[1], commands[1, :3])
+
+
 def test_without_a_ramp_there_is_no_guide():
     assert _make_env(1).curriculum.guide == 0.0
 
