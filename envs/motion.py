@@ -20,7 +20,7 @@ class Motion:
     base_ang_vel: torch.Tensor
     """Trunk angular velocity in the body frame. Shape: (num_envs, 3)."""
     velocity_error: torch.Tensor
-    """What is missing to what is followed of (v_x, v_y, w_z), averaged over
+    """What is missing to the (v_x, v_y, w_z) that the following terms ask for, averaged over
     `RewardsCfg.following_time`. Shape: (num_envs, 3)."""
     projected_gravity: torch.Tensor
     """Direction of gravity in the body frame. Shape: (num_envs, 3)."""

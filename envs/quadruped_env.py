@@ -392,8 +392,8 @@ class QuadrupedEnv(VecEnv):
         zeros = torch.zeros(num_envs, NUM_ACTIONS, device=device)
         self.action = self.last_action = self.action_before_last = self.last_joint_vel = zeros
         self.velocity_error = torch.zeros(num_envs, 3, device=device)
-        """What is missing to the commanded (v_x, v_y, w_z), averaged over
-        `RewardsCfg.following_time`, m/s and rad/s. Shape: (num_envs, 3)."""
+        """What is missing to `velocity_reference`, averaged over `RewardsCfg.following_time`, m/s
+        and rad/s. Shape: (num_envs, 3)."""
         self.velocity_reference = torch.zeros(num_envs, 3, device=device)
         """(v_x, v_y, w_z) that the following terms ask for, m/s and rad/s: the command, but for
         `RewardsCfg.following_acceleration`. Shape: (num_envs, 3)."""

@@ -14,7 +14,7 @@ from mute.checkpoint import CheckpointError, first_line, load_checkpoint
 from mute.config import TaskCfg, from_plain
 from mute.envs.observations import OBS_DIM
 from mute.envs.quadruped_env import NUM_ACTIONS
-from mute.learning.estimated_env import estimate_group, go_group, make_estimator
+from mute.learning.estimated_env import actor_groups, make_estimator
 from mute.learning.model import PreparedModel
 from mute.learning.saved_state import check_form, check_iteration, check_weights, entry
 from mute.networks.estimator import Estimate, Estimator
@@ -109,8 +109,7 @@ class LearnedController:
         obs = observations["policy"]
         self.estimate, self._state = policy.estimator.step(obs, self._state)
         with_phase = policy.cfg.agent.estimation.actor_uses_phase
-        group = estimate_group(self.estimate, policy.estimator, with_phase)
-        groups = {"policy": obs, "estimate": group, "go": go_group(obs)}
+        groups = actor_groups(obs, self.estimate, policy.estimator, with_phase)
         return policy.actor(TensorDict(groups, batch_size=[self.num_envs]))
 
 
@@ -119,8 +118,7 @@ def _actor(cfg: TaskCfg, estimator: Estimator) -> PreparedModel:
     with torch.no_grad():
         obs = torch.zeros(1, OBS_DIM)
         estimate, _ = estimator.step(obs, estimator.initial_state(1))
-    group = estimate_group(estimate, estimator, cfg.agent.estimation.actor_uses_phase)
-    groups = {"policy": obs, "estimate": group, "go": go_group(obs)}
+    groups = actor_groups(obs, estimate, estimator, cfg.agent.estimation.actor_uses_phase)
     example = TensorDict(groups, batch_size=[1])
     train_cfg = cfg.agent.rsl_rl()
     settings = {key: value for key, value in train_cfg["actor"].items() if key != "class_name"}

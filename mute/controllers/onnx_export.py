@@ -23,7 +23,7 @@ from mute.controllers.learned import Policy
 from mute.envs.observations import OBS_DIM, OBSERVATION_WIDTHS
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.scene import JOINT_NAMES, build_scene
-from mute.learning.estimated_env import estimate_group, go_group
+from mute.learning.estimated_env import actor_groups
 from mute.support.errors import MuteError
 from mute.support.files import replace_file
 
@@ -89,11 +89,7 @@ class _PolicyGraph(nn.Module):
     ) -> tuple[torch.Tensor, ...]:
         """Take one control step; shapes as in `export_policy`."""
         estimate, (hidden, cell) = self.estimator.step(obs, (hidden, cell))
-        groups = {
-            "policy": obs,
-            "estimate": estimate_group(estimate, self.estimator, self.with_phase),
-            "go": go_group(obs),
-        }
+        groups = actor_groups(obs, estimate, self.estimator, self.with_phase)
         action = self.actor(torch.cat([groups[name] for name in self.groups], dim=-1))
         return action, estimate.phase, estimate.base_lin_vel, hidden, cell
 

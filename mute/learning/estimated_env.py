@@ -20,7 +20,7 @@ from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.networks.estimator import Estimate, Estimator, State
 from mute.support.threads import use_collection_threads, use_learning_threads
 
-__all__ = ["EstimatedEnv", "estimate_group", "go_group", "make_estimator"]
+__all__ = ["EstimatedEnv", "actor_groups", "estimate_group", "go_group", "make_estimator"]
 
 _COMMAND = slices(OBSERVATION_WIDTHS)["command"]
 _VELOCITY_COMMAND = slice(_COMMAND.start, _COMMAND.start + BETA)
@@ -63,6 +63,24 @@ def go_group(obs: torch.Tensor) -> torch.Tensor:
     """
     size_sq = obs[:, _VELOCITY_COMMAND].square().sum(dim=-1, keepdim=True)
     return (size_sq > _SLOWEST**2).to(obs.dtype)
+
+
+def actor_groups(
+    obs: torch.Tensor, estimate: Estimate, estimator: Estimator, with_phase: bool
+) -> dict[str, torch.Tensor]:
+    """Return all observation groups that an actor may see.
+
+    Args:
+        obs: The group `policy`. Shape: (num_envs, OBS_DIM).
+        estimate: What is estimated from it. Shapes: (num_envs, ...).
+        estimator: The estimator that did.
+        with_phase: Whether the phase is part of the group `estimate`.
+    """
+    return {
+        "policy": obs,
+        "estimate": estimate_group(estimate, estimator, with_phase),
+        "go": go_group(obs),
+    }
 
 
 class EstimatedEnv(VecEnv):
@@ -186,8 +204,8 @@ class EstimatedEnv(VecEnv):
     def _consume(self, observations: TensorDict, state_before: State) -> None:
         observations = observations.to(self.device)
         self.state_before = state_before
-        self._estimate, self.state = self.estimator.step(observations["policy"], state_before)
+        obs = observations["policy"]
+        self._estimate, self.state = self.estimator.step(obs, state_before)
         groups = dict(observations.items())
-        groups["estimate"] = estimate_group(self._estimate, self.estimator, self.with_phase)
-        groups["go"] = go_group(observations["policy"])
+        groups |= actor_groups(obs, self._estimate, self.estimator, self.with_phase)
         self._observations = TensorDict(groups, batch_size=[self.num_envs], device=self.device)
