@@ -18,6 +18,7 @@ from .base_state import base_state
 from .commands import CommandSampler
 from .curriculum import Curriculum, curriculum
 from .engines import make_simulation
+from .following import FollowedVelocity
 from .footfall import Footfalls
 from .initial_state import NUM_DRAWS, place
 from .observations import (
@@ -95,6 +96,7 @@ class QuadrupedEnv(VecEnv):
         self.footfalls = Footfalls(
             cfg.footfall, cfg.num_envs, cfg.scene.timestep, cfg.decimation, self.device
         )
+        self.followed = FollowedVelocity(cfg.rewards, cfg.step_dt, cfg.num_envs, self.device)
         self.reward_sum = RewardSum(cfg.rewards, cfg.step_dt, cfg.num_envs, self.device)
         self.stand = torch.tensor(STAND_JOINT_POS, device=self.device)
         """Joint positions of the stance, rad. Shape: (12,)."""
@@ -190,6 +192,7 @@ class QuadrupedEnv(VecEnv):
         state["generator"] = self.generator.get_state()
         state["simulation"] = self.simulation.state_dict()
         state["footfalls"] = self.footfalls.state_dict()
+        state["followed"] = self.followed.state_dict()
         state["observations"] = {key: value.clone() for key, value in self._observations.items()}
         return state
 
@@ -207,6 +210,7 @@ class QuadrupedEnv(VecEnv):
         self.commands.command.copy_(state["command"])
         self.generator.set_state(state["generator"])
         self.footfalls.load_state_dict(state["footfalls"])
+        self.followed.load_state_dict(state["followed"])
         self._read_state()
         groups = {k: value.to(self.device, copy=True) for k, value in state["observations"].items()}
         self._observations = TensorDict(groups, batch_size=[self.num_envs])
@@ -263,7 +267,9 @@ class QuadrupedEnv(VecEnv):
             command=self.commands.command,
             base_lin_vel=self.base_lin_vel,
             base_ang_vel=self.base_ang_vel,
-            velocity_error=self._averaged_velocity_error(),
+            velocity_error=self.followed.update(
+                self.commands.command, self.base_lin_vel, self.base_ang_vel
+            ),
             projected_gravity=self.projected_gravity,
             base_height=self.base_pos[:, 2] - self.terrain.height(self.base_pos[:, :2]),
             joint_pos=self.joint_pos,
@@ -287,16 +293,6 @@ class QuadrupedEnv(VecEnv):
             fallen=self.fallen,
         )
 
-    def _averaged_velocity_error(self) -> torch.Tensor:
-        """Take this step into the average of the velocity error. Shape: (num_envs, 3)."""
-        velocity = torch.cat((self.base_lin_vel[:, :2], self.base_ang_vel[:, 2:]), dim=1)
-        ahead = self.commands.command[:, :3] - self.velocity_reference
-        limit = self._reference_step
-        self.velocity_reference = self.velocity_reference + ahead.clamp(-limit, limit)
-        error = self.velocity_reference - velocity
-        self.velocity_error = self.velocity_error.lerp(error, self._following_share)
-        return self.velocity_error
-
     def _clearance(self) -> torch.Tensor:
         """Return the air between each foot and the ground, m. Shape: (num_envs, 4)."""
         foot_pos = self._sensors.foot_pos
@@ -315,6 +311,7 @@ class QuadrupedEnv(VecEnv):
         self._lift_to_ground(mask)
         self.commands.resample(mask, True, self.curriculum.commands)
         self.footfalls.reset(mask, self._sensors.foot_contact)
+        self.followed.reset(mask)
         for name in _PAST:
             setattr(self, name, getattr(self, name).masked_fill(mask.unsqueeze(1), 0.0))
         self.episode_length_buf = self.episode_length_buf.masked_fill(mask, 0)
@@ -391,16 +388,6 @@ class QuadrupedEnv(VecEnv):
         num_envs, device = self.num_envs, self.device
         zeros = torch.zeros(num_envs, NUM_ACTIONS, device=device)
         self.action = self.last_action = self.action_before_last = self.last_joint_vel = zeros
-        self.velocity_error = torch.zeros(num_envs, 3, device=device)
-        """What is missing to `velocity_reference`, averaged over `RewardsCfg.following_time`, m/s
-        and rad/s. Shape: (num_envs, 3)."""
-        self.velocity_reference = torch.zeros(num_envs, 3, device=device)
-        """(v_x, v_y, w_z) that the following terms ask for, m/s and rad/s: the command, but for
-        `RewardsCfg.following_acceleration`. Shape: (num_envs, 3)."""
-        acceleration = self.cfg.rewards.following_acceleration
-        self._reference_step = acceleration * self.step_dt if acceleration else math.inf
-        time = self.cfg.rewards.following_time
-        self._following_share = -math.expm1(-self.step_dt / time) if time else 1.0
         self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long, device=device)
         nobody = torch.zeros(num_envs, dtype=torch.bool, device=device)
         self.fallen = nobody
@@ -416,12 +403,5 @@ class QuadrupedEnv(VecEnv):
         self._estimated_phase = torch.zeros(num_envs, len(LEGS), device=device)
 
 
-_PAST = (
-    "action",
-    "last_action",
-    "action_before_last",
-    "last_joint_vel",
-    "velocity_error",
-    "velocity_reference",
-)
+_PAST = ("action", "last_action", "action_before_last", "last_joint_vel")
 _STATE_TENSORS = (*_PAST, "episode_length_buf", "_estimated_phase", "physics")

@@ -507,8 +507,8 @@ def test_the_velocity_error_is_averaged_over_the_time_that_is_asked_for(time):
         env.step(torch.zeros(2, 12))
         velocity = torch.cat((env.base_lin_vel[:, :2], env.base_ang_vel[:, 2:]), dim=1)
         expected += share * (torch.tensor([0.5, -0.2, 0.3]) - velocity - expected)
-        torch.testing.assert_close(env.velocity_error, expected)
-    assert float(env.velocity_error.abs().max()) > 0.1
+        torch.testing.assert_close(env.followed.error, expected)
+    assert float(env.followed.error.abs().max()) > 0.1
 
 
 def test_what_is_followed_goes_from_command_to_command_with_the_acceleration_that_is_asked_for():
@@ -520,16 +520,16 @@ def test_what_is_followed_goes_from_command_to_command_with_the_acceleration_tha
         for _ in range(4):
             env.step(torch.zeros(2, 12))
             velocity = torch.cat((env.base_lin_vel[:, :2], env.base_ang_vel[:, 2:]), dim=1)
-            torch.testing.assert_close(env.velocity_error, env.velocity_reference - velocity)
-            seen.append(env.velocity_reference[0])
+            torch.testing.assert_close(env.followed.error, env.followed.reference - velocity)
+            seen.append(env.followed.reference[0])
     expected = [
         *([0.1, -0.1, 0.0], [0.2, -0.2, 0.0], [0.25, -0.3, 0.0], [0.25, -0.3, 0.0]),
         *([0.15, -0.2, 0.1], [0.05, -0.1, 0.1], [-0.05, 0.0, 0.1], [-0.05, 0.0, 0.1]),
     ]
     torch.testing.assert_close(torch.stack(seen), torch.tensor(expected))
     env.reset(torch.tensor([True, False]))
-    assert env.velocity_reference[0].abs().max() == 0.0
-    torch.testing.assert_close(env.velocity_reference[1], commands[1, :3])
+    assert env.followed.reference[0].abs().max() == 0.0
+    torch.testing.assert_close(env.followed.reference[1], commands[1, :3])
 
 
 def test_without_a_ramp_there_is_no_guide():
