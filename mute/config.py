@@ -128,6 +128,9 @@ class AgentCfg:
     """Number of rollouts and updates."""
     num_steps_per_env: int = 24
     """Control steps of a rollout."""
+    settling_share: float = 0.0
+    """Share of the iterations, the last ones, over which all learning rates fall to zero in a
+    straight line: without, the velocity at which a policy walks shifts from one to the next."""
     save_interval: int = 50
     """Iterations between checkpoints."""
     noise_interval: int = 20
@@ -169,6 +172,7 @@ class AgentCfg:
         ranges = {
             "iterations": _COUNT,
             "num_steps_per_env": Range(1, 10000, whole=True),
+            "settling_share": _SHARE,
             "save_interval": _COUNT,
             "noise_interval": Range(0, 10**9, whole=True),
             "actor_hidden": _WIDTH,

@@ -123,7 +123,7 @@ def _learn(argv: Sequence[str], ranks: Ranks, command: Sequence[str]) -> int:
         if checkpoint:
             _resume(runner, checkpoint)
             if is_given("--agent.ppo.learning-rate", argv):
-                runner.alg.learn_at(cfg.agent.ppo.learning_rate)
+                runner.learn_at(cfg.agent.ppo.learning_rate)
     same = (to_plain(cfg), kind, str(run_dir), runner.current_learning_iteration)
     ranks.check_equal("configuration or checkpoint", same)
     with ranks.together():

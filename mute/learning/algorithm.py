@@ -18,6 +18,7 @@ from mute.learning.estimated_env import EstimatedEnv
 from mute.learning.estimator_trainer import EstimatorTrainer
 from mute.learning.model import PreparedModel
 from mute.learning.optimizer import FusedAdam
+from mute.learning.settling import Settling
 from mute.learning.storage import PreparedStorage
 from mute.networks.estimator import State
 from mute.support.threads import use_learning_threads
@@ -43,8 +44,10 @@ class EstimatorPPO(PPO):
     """Processes that learn together."""
     optimizer: FusedAdam  # pyright: ignore[reportIncompatibleVariableOverride]
     """What actor and critic learn by."""
+    settling: Settling
+    """How learning rates fall at the end."""
     updates: int = 0
-    """Number of updates that went well."""
+    """Number of updates that went well, those before a resumption included."""
     _met: str | None = None
     """What the rollout brought that is not finite."""
 
@@ -62,12 +65,14 @@ class EstimatorPPO(PPO):
         algorithm.storage = storage
         return algorithm
 
-    def attach(self, env: EstimatedEnv, trainer: EstimatorTrainer, ranks: Ranks) -> None:
+    def attach(
+        self, env: EstimatedEnv, trainer: EstimatorTrainer, ranks: Ranks, settling: Settling
+    ) -> None:
         """Take on the estimator; to be called once, before anything else.
 
         A live module cannot come through rsl_rl's configuration, which is deep-copied.
         """
-        self.env, self.trainer, self.ranks = env, trainer, ranks
+        self.env, self.trainer, self.ranks, self.settling = env, trainer, ranks, settling
         # What rsl_rl's runner would say of ranks on GPUs; here they may learn on CPUs as well.
         self.is_multi_gpu = ranks.several
         self.gpu_world_size, self.gpu_global_rank = ranks.world_size, ranks.rank
@@ -115,6 +120,7 @@ class EstimatorPPO(PPO):
             DivergedError: If a loss, a weight or an estimate is not finite, on whatever rank.
         """
         use_learning_threads()
+        self._settle()
         # Clones made outside inference mode are ordinary tensors, which autograd accepts.
         hidden, cell = self._rollout_state
         losses = self.trainer.update(self.storage, (hidden.clone(), cell.clone()), self.ranks)
@@ -123,6 +129,16 @@ class EstimatorPPO(PPO):
         self._stop_where_not_finite(losses)
         self.updates += 1
         return losses
+
+    def _settle(self) -> None:
+        """Lower the learning rates where it is time to."""
+        before, rate = (self.settling.rate(self.updates - past) for past in (1, 0))
+        if rate == 1.0:
+            return
+        # The adaptive schedule would raise what is to fall: small steps bring a small divergence.
+        self.schedule = "fixed"
+        self.learn_at(self.learning_rate * rate / before)
+        self.trainer.optimizer.set_learning_rate(self.trainer.cfg.learning_rate * rate)
 
     def learn_at(self, learning_rate: float) -> None:
         """Go on with another learning rate of PPO's."""

@@ -51,6 +51,7 @@ RULES: dict[str, Rule] = {
     "env.randomization.push_velocity": "applied",
     "agent.iterations": "applied",
     "agent.num_steps_per_env": "applied",
+    "agent.settling_share": "applied",
     "agent.save_interval": "applied",
     "agent.noise_interval": "applied",
     "agent.actor_hidden": "kept",

@@ -25,6 +25,7 @@ from mute.learning.estimator_trainer import EstimatorTrainer
 from mute.learning.logger import TrainingLogger, quiet_writer_thread
 from mute.learning.resumption import check_resumption
 from mute.learning.saved_state import check_learner, check_own_state, check_totals, entry
+from mute.learning.settling import Settling
 from mute.learning.symmetry import groups, tie_actor_critic, tie_estimator
 from mute.support.signals import StopRequest
 from mute.support.threads import use_collection_threads
@@ -106,7 +107,7 @@ class MuteRunner(OnPolicyRunner):
         trainer = EstimatorTrainer(
             estimator, estimation, env.privileged_slices, feet.min_steps, feet.max_steps
         )
-        self.alg.attach(estimated, trainer, self.ranks)
+        self.alg.attach(estimated, trainer, self.ranks, Settling.of(cfg.agent))
         if cfg.agent.symmetric:
             by_group = groups(env, estimator.cfg.latent_dim, estimation.actor_uses_phase)
             tie_actor_critic(self.alg.actor, self.alg.critic, by_group, cfg.agent.leading_side)
@@ -146,7 +147,6 @@ class MuteRunner(OnPolicyRunner):
             DiskError: If curves cannot be written; what is learnt is saved if there is room for it.
             DivergedError: If something is no longer finite; nothing of that iteration is kept.
         """
-        first, updates = self.current_learning_iteration, self.alg.updates
         left = self.task_cfg.agent.iterations - self.current_learning_iteration
         with self.stop, quiet_writer_thread():
             try:
@@ -160,8 +160,7 @@ class MuteRunner(OnPolicyRunner):
                 self.logger.stop_logging_writer()  # writes out the last curves
             except DivergedError as error:
                 self.logger.stop_logging_writer()
-                iteration = first + self.alg.updates - updates
-                raise DivergedError(f"iteration {iteration}: {error}") from error
+                raise DivergedError(f"iteration {self.alg.updates}: {error}") from error
             if self.logger.disk_error is not None:
                 raise self.logger.disk_error
         return finished
@@ -236,6 +235,7 @@ class MuteRunner(OnPolicyRunner):
                 check_own_state(own, self._own_state(), self.alg)
             checkpoint["estimator_trainer"]["past"] = {} if own is None else own["estimator_past"]
             self.alg.load(checkpoint, load_cfg, strict)
+            self.alg.updates = checkpoint["iter"] + 1
             self._set_learning_rates(saved_cfg.agent)
             if own is None:
                 self.env.restart(checkpoint["env"]["env"]["step_count"])
@@ -248,18 +248,29 @@ class MuteRunner(OnPolicyRunner):
             raise CheckpointError(f"{path} does not fit this configuration: {reason}") from error
         self.robots_anew = own is None
         # The saved iteration is finished.
-        self.current_learning_iteration = checkpoint["iter"] + 1
+        self.current_learning_iteration = self.alg.updates
         # What was logged after the checkpoint is learnt, and logged, again.
         self.cfg["logger"]["first_iteration"] = self.current_learning_iteration
         return checkpoint["infos"] or {}
 
     def _set_learning_rates(self, saved: AgentCfg) -> None:
-        """Go on with the configured learning rates, but where the schedule has led PPO's on."""
+        """Go on with the configured learning rates, but where the schedule has led PPO's on.
+
+        Where the training now ends later, what had begun to settle is awake again.
+        """
         agent = self.task_cfg.agent
-        asked = agent.ppo.learning_rate
-        if agent.ppo.schedule == "fixed" or asked != saved.ppo.learning_rate:
-            self.alg.learn_at(asked)
+        asked, last = agent.ppo, self.alg.updates - 1
+        fell, falls = (Settling.of(each).rate(last) for each in (saved, agent))
+        newly_fixed = (asked.schedule, saved.ppo.schedule) == ("fixed", "adaptive")
+        if newly_fixed or asked.learning_rate != saved.ppo.learning_rate:
+            self.learn_at(asked.learning_rate)
+        elif falls != fell:
+            self.alg.learn_at(self.alg.learning_rate / fell * falls)
         self.alg.trainer.optimizer.set_learning_rate(agent.estimation.learning_rate)
+
+    def learn_at(self, learning_rate: float) -> None:
+        """Go on with another learning rate of PPO's, as far as it has fallen by now."""
+        self.alg.learn_at(learning_rate * self.alg.settling.rate(self.alg.updates - 1))
 
     @property
     def _on_cuda(self) -> bool:
