@@ -109,7 +109,7 @@ class LearnedController:
         obs = observations["policy"]
         self.estimate, self._state = policy.estimator.step(obs, self._state)
         with_phase = policy.cfg.agent.estimation.actor_uses_phase
-        groups = actor_groups(obs, self.estimate, policy.estimator, with_phase)
+        groups = actor_groups(obs, self.estimate, policy.estimator, policy.cfg.env, with_phase)
         return policy.actor(TensorDict(groups, batch_size=[self.num_envs]))
 
 
@@ -118,7 +118,8 @@ def _actor(cfg: TaskCfg, estimator: Estimator) -> PreparedModel:
     with torch.no_grad():
         obs = torch.zeros(1, OBS_DIM)
         estimate, _ = estimator.step(obs, estimator.initial_state(1))
-    groups = actor_groups(obs, estimate, estimator, cfg.agent.estimation.actor_uses_phase)
+    with_phase = cfg.agent.estimation.actor_uses_phase
+    groups = actor_groups(obs, estimate, estimator, cfg.env, with_phase)
     example = TensorDict(groups, batch_size=[1])
     train_cfg = cfg.agent.rsl_rl()
     settings = {key: value for key, value in train_cfg["actor"].items() if key != "class_name"}

@@ -82,6 +82,7 @@ class _PolicyGraph(nn.Module):
         self.estimator = policy.estimator
         self.actor = policy.actor.as_onnx(verbose=False)
         self.groups = policy.actor.obs_groups
+        self.env_cfg = policy.cfg.env
         self.with_phase = policy.cfg.agent.estimation.actor_uses_phase
 
     def forward(
@@ -89,7 +90,7 @@ class _PolicyGraph(nn.Module):
     ) -> tuple[torch.Tensor, ...]:
         """Take one control step; shapes as in `export_policy`."""
         estimate, (hidden, cell) = self.estimator.step(obs, (hidden, cell))
-        groups = actor_groups(obs, estimate, self.estimator, self.with_phase)
+        groups = actor_groups(obs, estimate, self.estimator, self.env_cfg, self.with_phase)
         action = self.actor(torch.cat([groups[name] for name in self.groups], dim=-1))
         return action, estimate.phase, estimate.base_lin_vel, hidden, cell
 

@@ -26,6 +26,8 @@ _COMMAND = slices(OBSERVATION_WIDTHS)["command"]
 _VELOCITY_COMMAND = slice(_COMMAND.start, _COMMAND.start + BETA)
 _SLOWEST = 0.01
 """Size of a velocity command, m/s and rad/s taken together, that rounding alone does not make."""
+_ROUNDING = 1e-3
+"""Share of a size that rounding may take away."""
 
 
 def make_estimator(cfg: TaskCfg) -> Estimator:
@@ -52,21 +54,30 @@ def estimate_group(estimate: Estimate, estimator: Estimator, with_phase: bool) -
     return torch.cat([*parts, estimate.phase] if with_phase else parts, dim=-1)
 
 
-def go_group(obs: torch.Tensor) -> torch.Tensor:
+def go_group(obs: torch.Tensor, cfg: QuadrupedEnvCfg) -> torch.Tensor:
     """Return the observation group `go`: 1 for robots that are asked to move, 0 to stand.
 
+    A command that is smaller than the deadband of the training's is one to stand.
+
     Args:
-        obs: The group `policy`. Shape: (num_envs, OBS_DIM).
+        obs: The group `policy`, with a command that bears no noise. Shape: (num_envs, OBS_DIM).
+        cfg: The environment of the training.
 
     Returns:
         Shape (num_envs, 1).
     """
+    slowest = max(_SLOWEST, (1.0 - _ROUNDING) * cfg.commands.deadband)
+    seen = abs(cfg.observations.scales["command"]) * slowest
     size_sq = obs[:, _VELOCITY_COMMAND].square().sum(dim=-1, keepdim=True)
-    return (size_sq > _SLOWEST**2).to(obs.dtype)
+    return (size_sq > seen**2).to(obs.dtype)
 
 
 def actor_groups(
-    obs: torch.Tensor, estimate: Estimate, estimator: Estimator, with_phase: bool
+    obs: torch.Tensor,
+    estimate: Estimate,
+    estimator: Estimator,
+    cfg: QuadrupedEnvCfg,
+    with_phase: bool,
 ) -> dict[str, torch.Tensor]:
     """Return all observation groups that an actor may see.
 
@@ -74,12 +85,13 @@ def actor_groups(
         obs: The group `policy`. Shape: (num_envs, OBS_DIM).
         estimate: What is estimated from it. Shapes: (num_envs, ...).
         estimator: The estimator that did.
+        cfg: The environment of the training.
         with_phase: Whether the phase is part of the group `estimate`.
     """
     return {
         "policy": obs,
         "estimate": estimate_group(estimate, estimator, with_phase),
-        "go": go_group(obs),
+        "go": go_group(obs, cfg),
     }
 
 
@@ -207,5 +219,5 @@ class EstimatedEnv(VecEnv):
         obs = observations["policy"]
         self._estimate, self.state = self.estimator.step(obs, state_before)
         groups = dict(observations.items())
-        groups |= actor_groups(obs, self._estimate, self.estimator, self.with_phase)
+        groups |= actor_groups(obs, self._estimate, self.estimator, self.cfg, self.with_phase)
         self._observations = TensorDict(groups, batch_size=[self.num_envs], device=self.device)

@@ -6,6 +6,9 @@ import pytest
 import torch
 from tensordict import TensorDict
 
+from mute.envs.commands import CommandsCfg
+from mute.envs.observations import ObservationsCfg
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.learning.estimated_env import EstimatedEnv, estimate_group, go_group
 from mute.networks.estimator import Estimate, Estimator, EstimatorCfg
 
@@ -18,7 +21,7 @@ class _ScriptedEnv:
 
     num_envs, num_actions, max_episode_length = NUM_ENVS, 12, 10
     device = torch.device("cpu")
-    cfg = None
+    cfg = QuadrupedEnvCfg()
 
     def __init__(self, *dones: list[bool]) -> None:
         self.calls: list[tuple[str, torch.Tensor]] = []
@@ -85,7 +88,17 @@ def test_the_signal_to_go_is_given_by_every_velocity_command_but_none():
     obs[:, 42:45] = torch.tensor(
         [[0, 0, 0], [1e-4, 0, 0], [0.02, 0, 0], [0, -0.02, 0], [0, 0, 1.0], [-1.0, 0.5, 0]]
     )
-    assert go_group(obs).tolist() == [[0.0], [0.0], [1.0], [1.0], [1.0], [1.0]]
+    assert go_group(obs, QuadrupedEnvCfg()).tolist() == [[0.0], [0.0], [1.0], [1.0], [1.0], [1.0]]
+
+
+def test_the_signal_to_go_knows_of_the_deadband_and_of_the_scale_of_commands():
+    scales = ObservationsCfg().scales | {"command": 2.0}
+    cfg = QuadrupedEnvCfg(
+        commands=CommandsCfg(deadband=0.06), observations=ObservationsCfg(scales=scales)
+    )
+    obs = torch.ones(3, 46)
+    obs[:, 42:45] = 2.0 * torch.tensor([[0.05, 0.0, 0.0], [0.06, 0.0, 0.0], [0.0, -0.05, 0.05]])
+    assert go_group(obs, cfg).tolist() == [[0.0], [1.0], [1.0]]
 
 
 @pytest.mark.parametrize(("with_phase", "width"), [(True, 3 + 4 + 2 + 4), (False, 3 + 4 + 2)])

@@ -123,7 +123,7 @@ def test_all_networks_commute_with_the_mirror_after_learning(runner):
             if mirror:
                 parts = {name: reflections[name](part) for name, part in parts.items()}
             parts["estimate"] = estimate_group(seen, estimator, with_phase=True)
-            parts["go"] = go_group(parts["policy"])
+            parts["go"] = go_group(parts["policy"], runner.env.cfg)
             views.append(TensorDict(parts, batch_size=[20]))
         actions = [runner.alg.actor(view) for view in views]
         values = [runner.alg.critic(view) for view in views]
@@ -208,3 +208,19 @@ def test_a_leading_side_needs_symmetric_networks():
     AgentCfg(symmetric=True, leading_side=True)
     with pytest.raises(ValueError, match=r"agent\.leading_side must be false unless agent\.symm"):
         AgentCfg(leading_side=True)
+
+
+@pytest.mark.parametrize("leading", [False, True])
+def test_a_leading_side_alone_keeps_a_mirrored_robot_from_a_mirrored_answer(leading):
+    cfg = make_cfg(1)
+    agent = dataclasses.replace(cfg.agent, symmetric=True, leading_side=leading)
+    torch.manual_seed(0)
+    runner = MuteRunner("go1_mute", dataclasses.replace(cfg, agent=agent), None)
+    reflections = groups(runner.env.env, cfg.agent.estimation.network.latent_dim, with_phase=True)
+    seen = runner.env.get_observations()
+    names = runner.alg.actor.obs_groups
+    image = {name: reflections[name](seen[name]) for name in names}
+    with torch.no_grad():
+        mirrored = runner.alg.actor(TensorDict(image, batch_size=seen.batch_size))
+        answer = JOINTS(runner.alg.actor(seen))
+    assert torch.allclose(mirrored, answer, atol=1e-5) is not leading
