@@ -32,9 +32,10 @@ class CommandsCfg:
     standing_fraction: float = 0.1
     """Share of the velocity commands that are zero."""
     single_axis_fraction: float = 0.0
-    """Share of them that go along one axis or turn, one of the three alone, as people drive."""
+    """Share of the velocity commands that are of one axis alone, forward, sideways or a turn, as
+    people drive."""
     slow_fraction: float = 0.0
-    """Share of them that are slow."""
+    """Share of the velocity commands that are slow."""
     slow_share: float = 0.3
     """Share of the velocity ranges that slow ones are drawn from."""
     deadband: float = 0.0

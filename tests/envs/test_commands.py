@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
@@ -180,3 +181,26 @@ def test_the_ranges_of_the_velocities_grow_with_the_training_and_beta_does_not()
 def test_a_bad_growth_is_refused_by_name(field, value):
     with pytest.raises(ValueError, match=f"commands.{field}"):
         CommandsCfg(**{field: value})
+
+
+def test_commands_that_are_drawn_evenly_keep_nothing_of_a_task_but_its_ranges():
+    evenly = CommandsCfg(
+        lin_vel_x=(-0.4, 0.8),
+        lin_vel_y=(-0.1, 0.2),
+        ang_vel_z=(-0.3, 0.3),
+        beta=(0.2, 0.9),
+        standing_fraction=0.2,
+    )
+    shaped = dataclasses.replace(
+        evenly,
+        beta_end_fraction=0.4,
+        standing_fraction=0.3,
+        single_axis_fraction=0.3,
+        slow_fraction=0.4,
+        slow_share=0.2,
+        deadband=0.06,
+        resampling_time=2.0,
+        initial_share=0.5,
+        ramp=(1.0, 2.0),
+    )
+    assert shaped.drawn_evenly(0.2) == evenly
