@@ -1,4 +1,4 @@
-"""How many robots fall on the commands of the training."""
+"""How many robots fall on commands that are drawn evenly."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _FALLS = Target(below=0.01)
 def measure_falls(policy: Policy, robots: int, seed: int, on_work: OnWork) -> PartResult:
     """Measure the share of robots that fall in an episode.
 
-    Commands and betas are drawn, and drawn anew within the episode, as the policy's task does it.
+    Commands and betas are drawn evenly from the task's ranges, and drawn anew within the episode.
 
     Args:
         policy: What walks, `under_conditions`.
@@ -30,7 +30,7 @@ def measure_falls(policy: Policy, robots: int, seed: int, on_work: OnWork) -> Pa
     """
     env = make_env(randomized_cfg(policy, robots, _EPISODE, seed))
     controller = LearnedController(policy, robots)
-    cfg = policy.cfg.env.commands
+    cfg = policy.cfg.env.commands.drawn_evenly()
     generator = torch.Generator().manual_seed(seed)
     sampler = CommandSampler(cfg, robots, generator, torch.device("cpu"))
     everyone = torch.ones(robots, dtype=torch.bool)

@@ -50,7 +50,7 @@ _RECOVERY_TIME = 3.0
 _STILL_TIME = 0.5
 """Last part of it, in which the robot must be still, s."""
 _SURFACE = "wood"
-_SHARE = Target(at_least=0.98)
+_SHARE = Target(at_least=1.0)
 _JOINT_SPEED = Target(at_most=0.03)
 _LEVEL = Target(at_most=56.0)
 

@@ -1,4 +1,4 @@
-"""Falls are counted over an episode whose commands the task draws."""
+"""Falls are counted over an episode whose commands are drawn evenly, whatever the task does."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ class _Notes(Standing):
 def test_robots_that_fall_on_drawn_commands_are_counted(monkeypatch):
     notes: list[torch.Tensor] = []
     monkeypatch.setattr(falls, "LearnedController", lambda policy, robots: _Notes(robots, notes))
-    monkeypatch.setattr(falls, "_EPISODE", 3.5)
+    monkeypatch.setattr(falls, "_EPISODE", 10.5)
     policy = under_conditions(make_random_policy())
-    policy.cfg.env.commands.resampling_time = 3.0
+    policy.cfg.env.commands.resampling_time = 3.0  # of the task; here a command holds for 10 s
     policy.cfg.env.max_tilt = 0.3  # who leans has fallen
     work: list[float] = []
     result = measure_falls(policy, 6, 0, work.append)
     seen = torch.stack(notes)  # (steps, robots, 4)
-    assert len(seen) == 175
-    assert bool((seen[1:150, :, :3] == seen[:149, :, :3]).all())
-    assert not bool((seen[150, :, :3] == seen[149, :, :3]).all())
+    assert len(seen) == 525
+    assert bool((seen[1:500, :, :3] == seen[:499, :, :3]).all())
+    assert not bool((seen[500, :, :3] == seen[499, :, :3]).all())
     assert bool((seen[:, :, 3] == seen[0, :, 3]).all())  # beta stays for the episode
     expected = int((seen[0, :, 3] > 0.5).sum())
     assert 0 < expected < 6
     assert result.tables["falls"][0] == {"robots": 6, "fell": expected, "unstable": 0}
     assert result.figures[0].value == pytest.approx(expected / 6)
-    assert sum(work) == pytest.approx(6 * 3.5)
+    assert sum(work) == pytest.approx(6 * 10.5)
