@@ -26,9 +26,10 @@ from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.estimation_errors import EstimationMeter
 from mute.evaluation.matched_speed import sweep_beta_at_speed
 from mute.evaluation.progress import Milestone, checkpoints_of, training_minutes, walks
+from mute.evaluation.reliability.conditions import under_conditions
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.trials import evaluation_cfg, run_trial
-from mute.support.provenance import REPOSITORY, machine_kind
+from mute.support.provenance import REPOSITORY, file_sha256, machine_kind
 from mute.support.ranges import Range
 
 __all__ = ["GaitArgs", "ProgressArgs", "gait", "progress"]
@@ -67,7 +68,7 @@ class ProgressArgs:
     seconds: float = 20.0
     """Length of a trial, s."""
     randomized: bool = False
-    """Keep the training's randomised physics, pushes and sensor noise."""
+    """Robots that differ and see with noise, as `reliability` has them; nobody is pushed."""
     seed: int = 1
     """Seed of initial states and commands."""
     out: Path = Path("evaluation")
@@ -79,9 +80,12 @@ def progress(args: ProgressArgs) -> None:
     check_trials(args.trials, args.seconds)
     check_seed(args.seed)
     torch.set_num_threads(1)  # the physics engine has the cores
+    paths = checkpoints_of(args.run)
     rows: list[dict[str, Any]] = []
-    for path in track(checkpoints_of(args.run), "checkpoints"):
+    for path in track(paths, "checkpoints"):
         policy, minutes = load_policy(path), training_minutes(path)
+        if args.randomized:
+            policy = under_conditions(policy)
         env = _environment(policy, args.trials, args.seconds, args.seed, args.randomized)
         draw = _draw_commands(env, args.seed)
         steps = round(args.seconds / env.step_dt)
@@ -101,7 +105,15 @@ def progress(args: ProgressArgs) -> None:
             break
     print_table(f"{args.trials} trials of {args.seconds:g} s", rows, list(rows[0]))
     write_csv(args.out / "progress.csv", rows)
-    summary = {"machine": machine_kind(), "trials": args.trials, "checkpoints": rows}
+    summary = {
+        "machine": machine_kind(),
+        "trained_seed": load_policy(paths[0]).cfg.env.seed,
+        "trials": args.trials,
+        "seconds": args.seconds,
+        "randomized": args.randomized,
+        "seed": args.seed,
+        "checkpoints": rows,
+    }
     write_json(args.out / "progress.json", summary)
     print(f"written: {args.out}/progress.json, progress.csv")
 
@@ -125,6 +137,8 @@ def gait(args: GaitArgs) -> None:
     write_csv(args.out / "gait_at_speed.csv", at_speed)
     summary = {
         "policy": os.path.relpath(args.policy, REPOSITORY),
+        "policy_sha256": file_sha256(args.policy),
+        "trained_seed": policy.cfg.env.seed,
         "iteration": policy.iteration,
         "trials": args.trials,
         "seconds": args.seconds,
