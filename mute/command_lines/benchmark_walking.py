@@ -26,6 +26,7 @@ from typing import Any
 
 from mute.command_lines.benchmark_turns import Version
 from mute.support.errors import MuteError
+from mute.support.programs import end_program
 from mute.support.provenance import current_commit
 
 __all__ = ["time_to_walk"]
@@ -45,9 +46,6 @@ _FIRST = 40
 
 _POLL = 0.05
 """How often it is looked for a new checkpoint, s."""
-
-_GRACE = 30.0
-"""How long a training may take to end when asked to, s."""
 
 
 def time_to_walk(
@@ -155,19 +153,7 @@ def _training(
     try:
         yield process
     finally:
-        _end(process)
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a training, halted or not, even if whoever waits for that is interrupted once more."""
-    try:
-        process.terminate()
-        process.send_signal(signal.SIGCONT)  # one that is halted learns of no other signal
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(_GRACE)
-    finally:
-        process.kill()  # takes a halted one as well, and none that has ended
-        process.wait()
+        end_program(process)
 
 
 def _checkpoints(
