@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import signal
 
+from mute.acoustics.metering.running_filter import RunningFilter
+
 __all__ = ["MAX_SAMPLE_RATE", "MIN_SAMPLE_RATE", "AWeighting", "a_weighting_db", "a_weighting_sos"]
 
 MIN_SAMPLE_RATE = 8000
@@ -39,9 +41,6 @@ _FIT_POINTS = 400
 
 _FOUR_ZEROS_UP_TO = 192000
 """Sample rate up to which four zeros are fitted, Hz; above it, two."""
-
-_REST = 1e-150
-"""A filter's state below this is nothing: its square is just above the slow denormal numbers."""
 
 
 def a_weighting_db(frequency: ArrayLike) -> NDArray[np.float64]:
@@ -127,12 +126,8 @@ def _response(sections: NDArray[np.float64], angle: NDArray[np.float64]) -> NDAr
     return np.prod([np.polyval(s[:3], z) / np.polyval(s[3:], z) for s in sections], axis=0)
 
 
-class AWeighting:
-    """The A-weighting of a stream of any number of channels.
-
-    Before its first sample each channel is taken to have had that sample's value for ever, so that
-    a recording with a constant offset does not begin with a bang.
-    """
+class AWeighting(RunningFilter):
+    """The A-weighting of a stream of any number of channels."""
 
     def __init__(self, sample_rate: int) -> None:
         """Make the filter.
@@ -143,25 +138,4 @@ class AWeighting:
         Raises:
             ValueError: If the sample rate is not within `MIN_SAMPLE_RATE` and `MAX_SAMPLE_RATE`.
         """
-        self._sections = a_weighting_sos(sample_rate)
-        self._state: NDArray[np.float64] | None = None
-
-    def filter(self, block: NDArray) -> NDArray[np.float64]:
-        """Return the next samples, weighted; any lengths of blocks give the same samples.
-
-        Args:
-            block: Shape: (channels, samples).
-
-        Returns:
-            Shape: (channels, samples).
-        """
-        block = np.asarray(block, dtype=np.float64)
-        if block.shape[1] == 0:
-            return block
-        if self._state is None:
-            settled = signal.sosfilt_zi(self._sections)[:, None, :]
-            self._state = settled * block[None, :, :1]
-        weighted, state = signal.sosfilt(self._sections, block, axis=-1, zi=self._state)
-        state[np.abs(state) < _REST] = 0.0
-        self._state = state
-        return weighted
+        super().__init__(a_weighting_sos(sample_rate))
