@@ -122,11 +122,15 @@ class WavReader:
     ) -> None:
         self._closing.close()
 
-    def blocks(self, length: int | None = None) -> Iterator[NDArray[np.float64]]:
-        """Yield the samples from the first on; `clipped` and `peak` begin anew.
+    def blocks(
+        self, length: int | None = None, begin: int = 0, end: int | None = None
+    ) -> Iterator[NDArray[np.float64]]:
+        """Yield the samples, or a part of them; `clipped` and `peak` begin anew.
 
         Args:
             length: Samples a channel in each block but the last. Default: what memory bears.
+            begin: Number of the first sample, from 0.
+            end: Number after that of the last, <= `frames`. Default: the end of the recording.
 
         Yields:
             Samples, full scale is 1. Shape: (channels, <= length).
@@ -136,8 +140,9 @@ class WavReader:
                 its end.
         """
         self.clipped[:], self.peak[:] = 0, 0.0
-        done = 0
-        for raw in self._raw_blocks("int32" if self._shift else "float64", length):
+        done = begin
+        dtype = "int32" if self._shift else "float64"
+        for raw in self._raw_blocks(dtype, length, begin, end):
             block = np.left_shift(raw, self._shift) / 2.0**31 if self._shift else raw
             self._refuse_unmeasurable(block, done)
             self.clipped += self._at_full_scale(block)
@@ -146,13 +151,18 @@ class WavReader:
             done += block.shape[1]
 
     def _raw_blocks(
-        self, dtype: Literal["float64", "int32"], length: int | None = None
+        self,
+        dtype: Literal["float64", "int32"],
+        length: int | None = None,
+        begin: int = 0,
+        end: int | None = None,
     ) -> Iterator[NDArray]:
         """Yield the samples as soundfile converts them. Shape: (channels, <= length)."""
         length = length or max(_SAMPLES_AT_ONCE // self.channels, 1)
-        for begin in range(0, self.frames, length):
-            wanted = min(length, self.frames - begin)
-            self._sound.seek(begin)
+        stop: int = self.frames if end is None else end
+        for first in range(begin, stop, length):
+            wanted = min(length, stop - first)
+            self._sound.seek(first)
             frames = self._sound.read(wanted, dtype=dtype, always_2d=True)
             if self._bytes.error:
                 raise MuteError(f"{self.path}: cannot be read: {self._bytes.error.strerror}")

@@ -36,6 +36,7 @@ __all__ = [
     "LevelDetector",
     "Levels",
     "TimeWeighting",
+    "figure_symbol",
     "settling_time",
 ]
 
@@ -90,6 +91,12 @@ def settling_time(time_weighting: TimeWeighting) -> float:
     return _SETTLING * TIME_CONSTANTS[time_weighting]
 
 
+def figure_symbol(name: str, time_weighting: TimeWeighting) -> str:
+    """Return what a figure of `Levels` is usually called: LAFmax, or LASmax with Slow."""
+    maximum = "LASmax" if time_weighting == "slow" else "LAFmax"
+    return {"laeq": "LAeq", "lafmax": maximum}.get(name, name.upper())
+
+
 class LevelDetector:
     """The exponential detector of any number of channels, streamed.
 
@@ -129,6 +136,7 @@ class LevelDetector:
         self._decay = math.exp(-1.0 / (sample_rate * TIME_CONSTANTS[time_weighting]))
         self._first_reading = round(settling_time(time_weighting) * READINGS_PER_SECOND)
         self._samples = 0
+        self._forgotten = 0
         self._state = np.zeros((channels, 1))
         self._sum = np.zeros(channels)
         self._max = np.zeros(channels)
@@ -163,6 +171,17 @@ class LevelDetector:
         self._reading_count += read.shape[1]
         self._samples += squares.shape[1]
 
+    def forget(self) -> None:
+        """Leave what came so far out of the figures and readings.
+
+        The detector keeps what it has heard, so it need not settle again, and time goes on: the
+        next reading is the one that would have come next.
+        """
+        self._first_reading = max(self._first_reading, self._readings_within(self._samples) + 1)
+        self._forgotten = self._samples
+        self._sum[:], self._max[:] = 0.0, 0.0
+        self._readings, self._reading_count = [], 0
+
     @property
     def level(self) -> NDArray[np.float64]:
         """What the detector shows now, dB. Shape: (channels,)."""
@@ -170,7 +189,7 @@ class LevelDetector:
 
     @property
     def exposure(self) -> NDArray[np.float64]:
-        """Integral of the squares over time so far, signal unit squared s. Shape: (channels,)."""
+        """Integral of the squares over time, signal unit squared s. Shape: (channels,)."""
         return self._sum / self.sample_rate
 
     @property
@@ -193,21 +212,22 @@ class LevelDetector:
         return (self._first_reading + numbers) / READINGS_PER_SECOND
 
     def result(self) -> list[Levels]:
-        """Return the figures of what came so far, one for each channel.
+        """Return the figures of what came so far and was not forgotten, one for each channel.
 
         Raises:
             ValueError: If nothing came.
         """
-        if self._samples == 0:
+        samples = self._samples - self._forgotten
+        if samples == 0:
             raise ValueError("no levels of an empty signal")
-        means = self._decibels(self._sum / self._samples)
+        means = self._decibels(self._sum / samples)
         maxima = self._decibels(self._max)
         return [
             Levels(
                 **_figures(readings),
                 laeq=float(mean),
                 lafmax=float(maximum),
-                seconds=self._samples / self.sample_rate,
+                seconds=samples / self.sample_rate,
                 sample_rate=self.sample_rate,
                 readings=len(readings),
             )
@@ -219,14 +239,16 @@ class LevelDetector:
 
         Reading k comes after sample number round(k sample_rate / 20), in whole numbers.
         """
+        begin = max(self._readings_within(self._samples) + 1, self._first_reading)
+        end = self._readings_within(self._samples + length)
+        numbers = np.arange(begin, end + 1, dtype=np.int64)
         rate = READINGS_PER_SECOND
-
-        def readings_within(samples: int) -> int:
-            return (rate * samples + rate // 2 - 1) // self.sample_rate
-
-        begin = max(readings_within(self._samples) + 1, self._first_reading)
-        numbers = np.arange(begin, readings_within(self._samples + length) + 1, dtype=np.int64)
         return (numbers * self.sample_rate + rate // 2) // rate - 1 - self._samples
+
+    def _readings_within(self, samples: int) -> int:
+        """Return how many readings there are in so many samples from the start, settled or not."""
+        rate = READINGS_PER_SECOND
+        return (rate * samples + rate // 2 - 1) // self.sample_rate
 
     def _decibels(self, mean_squares: NDArray[np.float64]) -> NDArray[np.float64]:
         with np.errstate(divide="ignore"):  # the level of silence is minus infinity

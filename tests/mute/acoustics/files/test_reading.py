@@ -64,6 +64,19 @@ def test_a_file_is_read_in_blocks_of_the_length_that_is_asked_for(tmp_path):
     np.testing.assert_array_equal(np.concatenate(blocks, axis=1), samples)
 
 
+def test_a_part_of_a_file_is_read_and_counted_alone(tmp_path):
+    path = tmp_path / "file.wav"
+    values = np.array([-(2**15), *range(1, 10), 2**15 - 1], dtype=np.int16)
+    wavfile.write(path, 8000, values)
+    with WavReader(path) as wav:
+        blocks = list(wav.blocks(3, begin=4, end=9))
+        assert [block.shape[1] for block in blocks] == [3, 2]
+        np.testing.assert_array_equal(np.concatenate(blocks, axis=1)[0] * 2.0**15, values[4:9])
+        assert wav.clipped.tolist() == [0]
+        assert wav.peak.tolist() == [8.0 / 2.0**15]
+        assert list(wav.blocks(begin=4, end=4)) == []
+
+
 def test_a_file_can_be_gone_through_twice_and_counts_anew(tmp_path):
     data = struct.pack("<3h", 32767, 0, -16384)
     with WavReader(write_bytes(tmp_path, wav_bytes(1, 16, data))) as wav:

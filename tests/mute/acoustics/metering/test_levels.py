@@ -119,6 +119,39 @@ def test_blocks_of_any_length_give_the_same_figures():
         assert left.laeq == pytest.approx(right.laeq, abs=1e-9)
 
 
+def test_what_was_forgotten_is_in_no_figure_and_settles_the_detector():
+    squares = np.random.default_rng(4).exponential(size=4 * RATE)
+    squares[: 2 * RATE] *= 100.0
+    whole = detect(squares)
+    part = LevelDetector(RATE, reference=1.0)
+    part.update(squares[None, : 3 * RATE])
+    part.forget()
+    part.update(squares[None, 3 * RATE :])
+    later = whole.reading_times > 3.0
+    np.testing.assert_array_equal(part.reading_times, whole.reading_times[later])
+    np.testing.assert_allclose(part.readings[0], whole.readings[0, later], rtol=0.0, atol=1e-9)
+    (levels,) = part.result()
+    assert (levels.readings, levels.seconds) == (20, 1.0)
+    assert levels.laeq == pytest.approx(10.0 * math.log10(np.mean(squares[3 * RATE :])))
+    assert levels.mnl == pytest.approx(whole.readings[0, later].mean())
+    assert levels.pnl <= levels.lafmax < whole.result()[0].lafmax - 10.0
+
+
+def test_what_was_forgotten_before_the_detector_settled_leaves_it_to_settle():
+    detector = LevelDetector(RATE, reference=1.0)
+    detector.update(np.ones((1, 300)))
+    detector.forget()
+    detector.update(np.ones((1, 400)))
+    np.testing.assert_allclose(detector.reading_times, [0.5, 0.55, 0.6, 0.65, 0.7])
+
+
+def test_of_what_was_all_forgotten_there_are_no_levels():
+    detector = detect(np.ones(RATE))
+    detector.forget()
+    with pytest.raises(ValueError, match="empty"):
+        detector.result()
+
+
 def test_channels_are_measured_apart():
     squares = np.stack([np.full(RATE, 1.0), np.full(RATE, 100.0)])
     first, second = detect(squares).result()

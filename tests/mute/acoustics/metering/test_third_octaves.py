@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -92,7 +93,7 @@ def test_the_bands_are_those_that_the_sample_rate_carries(rate, highest):
 
 def test_the_bands_meet_and_ten_make_a_decade():
     bands = third_octaves(RATE)
-    for band, following in zip(bands, bands[1:], strict=False):
+    for band, following in itertools.pairwise(bands):
         assert band.high == pytest.approx(following.low, rel=1e-12)
     (kilohertz,) = [band for band in bands if band.nominal == 1000.0]
     assert math.sqrt(kilohertz.low * kilohertz.high) == pytest.approx(1000.0, rel=1e-12)
