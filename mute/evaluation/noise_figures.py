@@ -6,35 +6,25 @@ import io
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mute.evaluation.noise_levels import NoiseRow
+from mute.evaluation.plotting import COLOURS, STYLE
 from mute.support.files import write_file
 
 __all__ = ["draw_beta_sweep", "draw_speed_sweep", "save_figure"]
 
-_STYLE: dict[Any, Any] = {
-    "font.size": 9,
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "svg.hashsalt": "mute",  # the same data make the same file
-}
-_COLOURS = ("#b5482f", "#1f6f8b", "#6a8f3c", "#7b5ea7")
-
 
 def draw_speed_sweep(rows: Sequence[NoiseRow], directory: Path) -> list[Path]:
     """Draw levels against the actual speed, a line for each beta; return the files."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(5.2, 3.4), layout="constrained")
         axes = figure.subplots()
         betas = dict.fromkeys(row.beta for row in rows)
-        for colour, beta in zip(itertools.cycle(_COLOURS), betas, strict=False):
+        for colour, beta in zip(itertools.cycle(COLOURS), betas, strict=False):
             own = sorted((row for row in rows if row.beta == beta), key=lambda row: row.speed_mean)
             _draw_levels(axes, [row.speed_mean for row in own], own, colour, f"beta = {beta:g}")
         axes.set_xlabel("actual speed (m/s)")
@@ -47,10 +37,10 @@ def draw_beta_sweep(rows: Sequence[NoiseRow], directory: Path) -> list[Path]:
     """Draw levels and the squared tracking error against beta; return the files."""
     ordered = sorted(rows, key=lambda row: row.beta)
     betas = [row.beta for row in ordered]
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(5.2, 3.4), layout="constrained")
         axes = figure.subplots()
-        _draw_levels(axes, betas, ordered, _COLOURS[0], "level")
+        _draw_levels(axes, betas, ordered, COLOURS[0], "level")
         axes.set_xlabel("quiet factor beta")
         axes.set_title(
             f"{rows[0].surface}, {rows[0].command_speed:g} m/s commanded: "
@@ -58,8 +48,8 @@ def draw_beta_sweep(rows: Sequence[NoiseRow], directory: Path) -> list[Path]:
             fontsize=9,
         )
         other = axes.twinx()
-        other.plot(betas, [row.velocity_error_sq for row in ordered], color=_COLOURS[1], marker="s")
-        other.set_ylabel("squared tracking error ((m/s)$^2$)", color=_COLOURS[1])
+        other.plot(betas, [row.velocity_error_sq for row in ordered], color=COLOURS[1], marker="s")
+        other.set_ylabel("squared tracking error ((m/s)$^2$)", color=COLOURS[1])
         other.set_ylim(bottom=0.0)
         other.grid(visible=False)
         return save_figure(figure, directory / "sweep_beta")

@@ -1,12 +1,29 @@
-"""matplotlib, tried before there is anything to draw: figures go to files and need no backend."""
+"""matplotlib, tried before there is anything to draw, and the looks that figures share.
+
+Figures go to files and need no backend.
+"""
 
 from __future__ import annotations
 
 import os
+from typing import Any
 
 from mute.support.errors import MuteError
 
-__all__ = ["check_matplotlib"]
+__all__ = ["COLOURS", "STYLE", "check_matplotlib"]
+
+STYLE: dict[Any, Any] = {
+    "font.size": 9,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "svg.hashsalt": "mute",  # the same data make the same file
+}
+"""Settings of matplotlib's."""
+
+COLOURS = ("#b5482f", "#1f6f8b", "#6a8f3c", "#7b5ea7")
+"""What lines and bars are drawn in, one after the other."""
 
 
 def check_matplotlib() -> None:
