@@ -271,8 +271,12 @@ def check_video(path: Path | None) -> None:
         raise MuteError(f"--video must name an .mp4 file, got {str(path)!r}")
 
 
-def make_directory(path: Path) -> None:
-    """Make the directory of --out, before any work whose figures could not be kept.
+def make_directory(path: Path, option: str = "out") -> None:
+    """Make the directory of an option, before any work whose figures could not be kept.
+
+    Args:
+        path: The directory.
+        option: Name of the option, without the dashes.
 
     Raises:
         MuteError: If it cannot be made or written to.
@@ -280,9 +284,11 @@ def make_directory(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise MuteError(f"--out {path}: cannot be made a directory: {error.strerror}") from error
+        raise MuteError(
+            f"--{option} {path}: cannot be made a directory: {error.strerror}"
+        ) from error
     if not os.access(path, os.W_OK):
-        raise MuteError(f"--out {path}: cannot be written to")
+        raise MuteError(f"--{option} {path}: cannot be written to")
 
 
 def command_line() -> list[str]:

@@ -1,5 +1,5 @@
-"""How loud a sound is: weighting, detector, readings, for robots and recordings alike.
+"""How loud a sound is: weighting, detector, readings, spectrum, for robots and recordings alike.
 
-`wav_levels` measures recordings in files, and `calibrator` finds what their full scale is in Pa;
-all else knows neither files nor robots.
+`recordings` measures files, with `spans` and `wav_levels`; `calibrator` finds what their full scale
+is in Pa. All else knows neither files nor robots.
 """

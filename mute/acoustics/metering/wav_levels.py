@@ -4,23 +4,46 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mute.acoustics.files.reading import WavReader
-from mute.acoustics.metering.levels import LevelDetector, Levels, TimeWeighting, settling_time
+from mute.acoustics.metering.levels import (
+    READINGS_PER_SECOND,
+    LevelDetector,
+    Levels,
+    TimeWeighting,
+    settling_time,
+)
+from mute.acoustics.metering.spans import Span
+from mute.acoustics.metering.third_octaves import ThirdOctaveLevel, ThirdOctaveMeter
 from mute.acoustics.metering.weighting import MAX_SAMPLE_RATE, MIN_SAMPLE_RATE, AWeighting
 from mute.support.errors import MuteError
 
-__all__ = ["chosen_channels", "doubts", "energy_mean_levels", "open_wav"]
+__all__ = ["Measurement", "chosen_channels", "doubts", "measure_span", "open_wav"]
 
 _WIDE_BAND_RATE = 32000
 """Sample rate below which a part of what is heard is missing, Hz."""
 
 _INTEGER_LIKE = 100.0
 """Magnitude of floats from which they look like integers that were never scaled (chosen)."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What the meter makes of a span, in dB re its reference."""
+
+    levels: Levels
+    """Figures, A-weighted."""
+    third_octaves: tuple[ThirdOctaveLevel, ...]
+    """Spectrum, unweighted, from the lowest band on."""
+    reading_times: NDArray[np.float64]
+    """Times of the readings since the begin of the recording, s. Shape: (readings,)."""
+    readings: NDArray[np.float64]
+    """What the detector showed, dB. Shape: (readings,)."""
 
 
 def open_wav(path: Path) -> WavReader:
@@ -49,19 +72,23 @@ def chosen_channels(wav: WavReader, channel: int | None) -> list[int]:
     return [channel - 1]
 
 
-def energy_mean_levels(
+def measure_span(
     wav: WavReader,
     channels: Sequence[int],
     gains: NDArray[np.float64],
+    span: Span,
     time_weighting: TimeWeighting,
     reference: float,
-) -> Levels:
+) -> Measurement:
     """Return the levels of the energy mean: at each instant, the mean square of the channels.
+
+    What lies before the span settles detector and filters, and is in no figure.
 
     Args:
         wav: Recording.
         channels: Indices of the channels to measure.
         gains: What a sample of 1 is, in the unit of the reference. Shape: (channels,).
+        span: Part of the recording.
         time_weighting: "fast" or "slow".
         reference: Root mean square of 0 dB.
 
@@ -70,20 +97,40 @@ def energy_mean_levels(
     """
     weighting = AWeighting(wav.sample_rate)
     detector = LevelDetector(wav.sample_rate, 1, time_weighting, reference)
-    for block in wav.blocks():
-        weighted = weighting.filter(gains[:, None] * block[channels])
-        detector.update(np.square(weighted).mean(axis=0, keepdims=True))
-    return detector.result()[0]
+    spectrum = ThirdOctaveMeter(wav.sample_rate, reference)
+
+    def hear(begin: int, end: int) -> None:
+        for block in wav.blocks(begin=begin, end=end):
+            samples = gains[:, None] * block[channels]
+            spectrum.update(samples)
+            detector.update(np.square(weighting.filter(samples)).mean(axis=0, keepdims=True))
+
+    lead_in = span.lead_in(time_weighting)
+    hear(lead_in * wav.sample_rate, span.begin)
+    detector.forget()
+    spectrum.forget()
+    hear(span.begin, span.end)
+    return Measurement(
+        levels=detector.result()[0],
+        third_octaves=tuple(spectrum.result()),
+        reading_times=lead_in + detector.reading_times,
+        readings=detector.readings[0],
+    )
 
 
 def doubts(
-    wav: WavReader, channels: Sequence[int], levels: Levels, time_weighting: TimeWeighting
+    wav: WavReader,
+    channels: Sequence[int],
+    span: Span,
+    levels: Levels,
+    time_weighting: TimeWeighting,
 ) -> list[str]:
-    """Return what a user must know about the levels of a recording that was measured to its end.
+    """Return what a user must know about the levels of a recording that was measured.
 
     Args:
-        wav: Recording.
+        wav: Recording, of which the span was read last.
         channels: Indices of the channels that were measured.
+        span: Part that was measured.
         levels: Their levels.
         time_weighting: "fast" or "slow".
     """
@@ -101,10 +148,7 @@ def doubts(
             "not scaled to 1"
         )
     if levels.readings == 0:
-        found.append(
-            f"{wav.path}: shorter than the {settling_time(time_weighting):g} s in which the "
-            "detector settles, so there are no readings"
-        )
+        found.append(f"{wav.path}: {_why_no_reading(wav, span, time_weighting)}")
     elif levels.mnl == -math.inf:
         found.append(f"{wav.path}: digital silence in the readings, they have no mean")
     if wav.sample_rate < _WIDE_BAND_RATE:
@@ -116,3 +160,17 @@ def doubts(
             "choose one with --channel"
         )
     return found
+
+
+def _why_no_reading(wav: WavReader, span: Span, time_weighting: TimeWeighting) -> str:
+    """Return why there is no reading in a span."""
+    settling = settling_time(time_weighting)
+    if wav.frames < settling * wav.sample_rate:
+        return (
+            f"shorter than the {settling:g} s in which the detector settles, "
+            "so there are no readings"
+        )
+    return (
+        f"no readings from {span.begin_time:.3f} to {span.end_time:.3f} s; there are "
+        f"{READINGS_PER_SECOND} a second, from {settling:g} s of the recording on"
+    )

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from meter_helpers import run
 from places import REPOSITORY
 from wav_helpers import RATE, integers, packed, tone, wav_bytes, write_bytes, write_sound
 
@@ -66,13 +67,6 @@ def burst(milliseconds, rate=RATE):
     return np.concatenate(
         [silence, tone(frequency=4000.0, seconds=milliseconds / 1000.0, rate=rate), silence]
     )
-
-
-def run(capsys, *arguments):
-    """Return the JSON that the program prints, and its warnings."""
-    assert meter.main([*map(str, arguments), "--json"]) == 0
-    captured = capsys.readouterr()
-    return json.loads(captured.out), captured.err
 
 
 @pytest.fixture

@@ -52,8 +52,12 @@ def _numbers(command: str) -> Iterator[tuple[str, type]]:
     for field in fields(args_type):
         if is_dataclass(hints[field.name]):
             continue  # the configuration of a training, see `test_config`
-        for kind in _number_types(hints[field.name]):
-            yield field.name.replace("_", "-"), kind
+        hint = hints[field.name]
+        # An option that is no name of Python's, as --from, is called by what annotates the field.
+        names = (getattr(note, "name", None) for note in getattr(hint, "__metadata__", ()))
+        option = next(filter(None, names), field.name.replace("_", "-"))
+        for kind in _number_types(hint):
+            yield option, kind
 
 
 def _cases() -> Iterator[tuple[str, str, str]]:
