@@ -28,7 +28,7 @@ from mute.evaluation.matched_speed import sweep_beta_at_speed
 from mute.evaluation.progress import Milestone, checkpoints_of, training_minutes, walks
 from mute.evaluation.reliability.conditions import under_conditions
 from mute.evaluation.tables import print_table, write_csv, write_json
-from mute.evaluation.trials import evaluation_cfg, run_trial
+from mute.evaluation.trials import command_sampler, evaluation_cfg, run_trial
 from mute.support.provenance import REPOSITORY, file_sha256, machine_kind
 from mute.support.ranges import Range
 
@@ -182,13 +182,8 @@ def _environment(
 
 
 def _draw_commands(env: QuadrupedEnv, seed: int) -> CommandSampler:
-    """Return commands drawn evenly from the task's whole range, beta included, a tenth zero.
-
-    How often the task draws slow ones, say, must not change what is measured.
-    """
-    generator = torch.Generator().manual_seed(seed)
-    cfg = env.cfg.commands.drawn_evenly()
-    draw = CommandSampler(cfg, env.num_envs, generator, torch.device("cpu"))
+    """Return commands drawn evenly from the task's whole range, beta included, a tenth zero."""
+    draw = command_sampler(env.cfg.commands.drawn_evenly(), env.num_envs, seed)
     draw.resample(torch.ones(env.num_envs, dtype=torch.bool), with_beta=True)
     return draw
 

@@ -9,11 +9,12 @@ import torch
 from tensordict import TensorDict
 
 from mute.controllers.controller import Controller
+from mute.envs.commands import CommandSampler, CommandsCfg
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.evaluation.gait import GaitMeter
 
-__all__ = ["evaluation_cfg", "from_the_stance", "run_trial"]
+__all__ = ["command_sampler", "evaluation_cfg", "from_the_stance", "run_trial"]
 
 
 def evaluation_cfg(
@@ -55,6 +56,21 @@ def from_the_stance(cfg: QuadrupedEnvCfg) -> QuadrupedEnvCfg:
     return dataclasses.replace(
         cfg, initial_joint_noise=0.0, initial_velocity=0.0, random_heading=False
     )
+
+
+def command_sampler(cfg: CommandsCfg, robots: int, seed: int) -> CommandSampler:
+    """Return what draws commands to measure with, the same ones for each seed.
+
+    How often a task draws slow ones, say, must not change what is measured: see
+    `CommandsCfg.drawn_evenly`.
+
+    Args:
+        cfg: Ranges, and how commands are drawn from them.
+        robots: Number of robots.
+        seed: Of the draws.
+    """
+    generator = torch.Generator().manual_seed(seed)
+    return CommandSampler(cfg, robots, generator, torch.device("cpu"))
 
 
 def run_trial(

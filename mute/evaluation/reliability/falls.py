@@ -6,9 +6,9 @@ import torch
 
 from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
-from mute.envs.commands import CommandSampler
 from mute.evaluation.reliability.conditions import OnWork, make_env, randomized_cfg, walk
 from mute.evaluation.reliability.figures import Figure, PartResult, Target
+from mute.evaluation.trials import command_sampler
 
 __all__ = ["falls_work", "measure_falls"]
 
@@ -31,8 +31,7 @@ def measure_falls(policy: Policy, robots: int, seed: int, on_work: OnWork) -> Pa
     env = make_env(randomized_cfg(policy, robots, _EPISODE, seed))
     controller = LearnedController(policy, robots)
     cfg = policy.cfg.env.commands.drawn_evenly()
-    generator = torch.Generator().manual_seed(seed)
-    sampler = CommandSampler(cfg, robots, generator, torch.device("cpu"))
+    sampler = command_sampler(cfg, robots, seed)
     everyone = torch.ones(robots, dtype=torch.bool)
     fallen, unstable = torch.zeros_like(everyone), torch.zeros_like(everyone)
 

@@ -9,7 +9,7 @@ import torch
 
 from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
-from mute.envs.commands import BETA, CommandSampler, CommandsCfg
+from mute.envs.commands import BETA, CommandSampler
 from mute.evaluation.gait import GaitMeter
 from mute.evaluation.reliability.conditions import (
     OnWork,
@@ -19,6 +19,7 @@ from mute.evaluation.reliability.conditions import (
     walk,
 )
 from mute.evaluation.reliability.figures import Figure, PartResult, Target, worst
+from mute.evaluation.trials import command_sampler
 
 __all__ = ["Following", "follows_work", "measure_follows", "stop_and_go_falls", "velocity_errors"]
 
@@ -100,7 +101,7 @@ def velocity_errors(policy: Policy, each: int, seed: int, on_work: OnWork) -> di
     env = make_env(randomized_cfg(policy, robots, _RANGE_TIME, seed))
     controller = LearnedController(policy, robots)
     setting = torch.arange(robots) % len(_BETAS)
-    sampler = _sampler(policy.cfg.env.commands.drawn_evenly(), robots, seed)
+    sampler = command_sampler(policy.cfg.env.commands.drawn_evenly(), robots, seed)
     command = _drawn(sampler, setting)
     meter = GaitMeter(env, _RANGE_SETTLE_TIME)
 
@@ -128,7 +129,7 @@ def stop_and_go_falls(policy: Policy, each: int, seed: int, on_work: OnWork) -> 
     controller = LearnedController(policy, robots)
     setting = torch.arange(robots) % len(_BETAS)
     cfg = policy.cfg.env.commands.drawn_evenly(_STOPPED_SHARE)
-    sampler = _sampler(cfg, robots, seed)
+    sampler = command_sampler(cfg, robots, seed)
     fallen = torch.zeros(robots, dtype=torch.bool)
 
     def watch(_: torch.Tensor) -> None:
@@ -196,11 +197,6 @@ def _each(robots: int) -> int:
 def _half(robots: int) -> int:
     """Return the robots for each beta."""
     return max(1, robots // len(_BETAS))
-
-
-def _sampler(cfg: CommandsCfg, robots: int, seed: int) -> CommandSampler:
-    generator = torch.Generator().manual_seed(seed)
-    return CommandSampler(cfg, robots, generator, torch.device("cpu"))
 
 
 def _drawn(sampler: CommandSampler, setting: torch.Tensor) -> torch.Tensor:
