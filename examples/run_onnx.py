@@ -323,7 +323,8 @@ def _set_servos(spec: mujoco.MjSpec, policy: OnnxPolicy) -> None:
     """
     gains = zip(policy.joint_names, policy.stiffness, policy.damping, strict=True)
     for name, stiffness, damping in gains:
-        if spec.joint(name) is None:
+        joint = spec.joint(name)
+        if joint is None:
             raise ValueError(f"--model has no joint {name!r}, which the policy drives")
         actuators = [actuator for actuator in spec.actuators if actuator.target == name]
         if len(actuators) != 1:
@@ -333,7 +334,7 @@ def _set_servos(spec: mujoco.MjSpec, policy: OnnxPolicy) -> None:
         if is_motor and actuator.forcerange[0] >= actuator.forcerange[1]:
             actuator.forcerange = actuator.ctrlrange  # what limits a motor's command is its torque
         actuator.set_to_position(kp=stiffness, kv=damping)
-        spec.joint(name).damping = np.zeros_like(spec.joint(name).damping)
+        joint.damping = np.zeros_like(joint.damping)
         actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_FALSE
 
 

@@ -14,8 +14,8 @@ import numpy as np
 import onnx
 import onnxruntime
 import pytest
+import run_onnx as example
 import torch
-from onnx_example import EXAMPLE, load_example
 from other_go1 import write_menagerie_like_go1, write_motor_go1
 from places import REPOSITORY, RESOURCES
 
@@ -34,6 +34,7 @@ from mute.learning.runner import MuteRunner, policy_part
 from mute.networks.estimator import EstimatorCfg
 from mute.support.errors import MuteError
 
+EXAMPLE = REPOSITORY / "examples" / "run_onnx.py"
 HIDDEN = 24
 
 
@@ -331,7 +332,7 @@ def test_the_example_stands_before_it_goes_and_says_whether_it_goes_as_asked(exp
     ],
 )
 def test_the_example_tells_which_share_of_a_command_is_done(asked, motion, share):
-    assert load_example()._followed(np.array(asked), np.array(motion)) == pytest.approx(share)
+    assert example._followed(np.array(asked), np.array(motion)) == pytest.approx(share)
 
 
 def test_the_example_needs_neither_torch_nor_this_project():
@@ -349,7 +350,6 @@ def test_the_example_observes_what_the_environment_does(policy: Policy, exported
     action = torch.linspace(-1.0, 1.0, 12)
     for _ in range(5):
         env.step(action.unsqueeze(0))
-    example = load_example()
     runner = example.OnnxPolicy(exported)
     robot = example.Robot(example.GO1, runner)
     robot.data.qpos[:] = env.simulation.qpos[0]
@@ -362,7 +362,6 @@ def test_the_example_observes_what_the_environment_does(policy: Policy, exported
 
 
 def test_the_example_stands_the_robot_on_the_floor(exported: Path):
-    example = load_example()
     robot = example.Robot(example.GO1, example.OnnxPolicy(exported))
     # The stance's own keyframe touches the ground at this height.
     assert robot.height == pytest.approx(0.32475, abs=1e-4)
@@ -371,7 +370,6 @@ def test_the_example_stands_the_robot_on_the_floor(exported: Path):
 def test_the_example_turns_motors_into_servos_that_keep_their_torque_limit(
     exported: Path, tmp_path: Path
 ):
-    example = load_example()
     robot = example.Robot(write_motor_go1(tmp_path / "motors.xml"), example.OnnxPolicy(exported))
     # 20 N m/rad * 0.1 rad - 0.5 N m s/rad * 0.
     robot.step(robot.stand)
@@ -388,7 +386,6 @@ def test_the_example_turns_motors_into_servos_that_keep_their_torque_limit(
 def test_the_example_takes_the_damping_of_joints_for_that_of_a_servo(
     exported: Path, tmp_path: Path
 ):
-    example = load_example()
     model = write_menagerie_like_go1(tmp_path / "damped.xml")
     robot = example.Robot(model, example.OnnxPolicy(exported))
     robot.data.qvel[:] = 1.0
