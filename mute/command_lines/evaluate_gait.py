@@ -80,10 +80,11 @@ def progress(args: ProgressArgs) -> None:
     check_trials(args.trials, args.seconds)
     check_seed(args.seed)
     torch.set_num_threads(1)  # the physics engine has the cores
-    paths = checkpoints_of(args.run)
     rows: list[dict[str, Any]] = []
-    for path in track(paths, "checkpoints"):
+    trained_seed: int | None = None
+    for path in track(checkpoints_of(args.run), "checkpoints"):
         policy, minutes = load_policy(path), training_minutes(path)
+        trained_seed = policy.cfg.env.seed
         if args.randomized:
             policy = under_conditions(policy)
         env = _environment(policy, args.trials, args.seconds, args.seed, args.randomized)
@@ -107,7 +108,7 @@ def progress(args: ProgressArgs) -> None:
     write_csv(args.out / "progress.csv", rows)
     summary = {
         "machine": machine_kind(),
-        "trained_seed": load_policy(paths[0]).cfg.env.seed,
+        "trained_seed": trained_seed,
         "trials": args.trials,
         "seconds": args.seconds,
         "randomized": args.randomized,
