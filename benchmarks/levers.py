@@ -1,0 +1,234 @@
+"""Take the recipe's parts away, one at a time: python -m benchmarks.levers --out docs/levers.
+
+Each part is left out by flags of `train.py`, trained with several seeds, and judged by the targets
+of `evaluate.py reliability`. One luck is not a finding: what counts is the mean over the seeds and
+their spread. Physics steps are 10 ms, half as many as the recipe's, which is good enough to compare
+by. A training that is stopped goes on from its last checkpoint where the command is run again, and
+one that is judged already is not done again: several commands, each with seeds of its own, may
+share the folders.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from mute.command_lines.arguments import (
+    MANY_ROBOTS,
+    Words,
+    check_distinct,
+    check_option,
+    check_seed,
+    command_line,
+    parse,
+)
+from mute.evaluation.tables import print_table, read_json, write_json
+from mute.support.errors import MuteError, run_cli
+from mute.support.plain_data import without_nan
+from mute.support.programs import run_program
+from mute.support.ranges import Range
+from mute.tasks import DEFAULT_TASK, make_task
+
+__all__ = ["LEVERS", "LeversArgs", "main", "table"]
+
+_ROOT = Path(__file__).resolve().parents[1]
+_TERM = "--env.rewards.terms.{}.weight 0"
+
+LEVERS: Mapping[str, str] = {
+    "recipe": "",
+    "no_leading_side": "--agent.no-leading-side",
+    "no_go_signal": "--agent.no-go-signal",
+    "no_settling": "--agent.settling-share 0",
+    "no_following": f"{_TERM.format('lin_vel_following')} {_TERM.format('ang_vel_following')}",
+    "no_stepping": _TERM.format("stepping"),
+    "no_soft_steps": _TERM.format("soft_steps"),
+    "no_stamping": _TERM.format("stamping"),
+    "no_stillness": f"{_TERM.format('stand_still')} {_TERM.format('feet_lifted')}",
+    "at_once": "--env.rewards.following-acceleration 0 --env.rewards.following-time 0",
+    "no_beta_ends": "--env.commands.beta-end-fraction 0",
+    "no_slow_commands": "--env.commands.slow-fraction 0 --env.commands.single-axis-fraction 0",
+    "no_pushes": "--env.randomization.push-velocity 0",
+}
+"""What each training does without, as flags of `train.py`."""
+
+_PHYSICS = "--env.scene.timestep 0.01 --env.decimation 2"
+
+_FIGURES = {
+    "starts, beta 1": "robots that go, at the worst command, beta 1",
+    "error, beta 0": "squared velocity error, beta 0",
+    "error, beta 1": "squared velocity error, beta 1",
+    "softer at 0.5 m/s": "landings slower at beta 1, at 0.5 m/s",
+    "falls": "robots that fall in an episode of 20 s",
+}
+"""Columns of the table, and the figures that they show."""
+
+
+@dataclass
+class LeversArgs:
+    """Arguments of the comparison."""
+
+    levers: Words = tuple(LEVERS)
+    """Which of them."""
+    seeds: tuple[int, ...] = (0, 1, 2)
+    """Seeds to train each with."""
+    robots: int = 64
+    """Robots that a policy is judged by."""
+    iterations: int | None = None
+    """Iterations of each training; the recipe's unless given."""
+    log_dir: Path = Path("runs/levers")
+    """Folder of the trainings."""
+    out: Path = Path("docs/levers")
+    """Folder of what is found, one file for each lever and seed."""
+    table: bool = False
+    """Train nothing: make the table of what is there."""
+    json: bool = False
+    """Print JSON and nothing else."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    Raises:
+        MuteError: If an argument is bad, or a training or its evaluation fails.
+    """
+    argv = command_line() if argv is None else list(argv)
+    args = parse(LeversArgs, argv, "Take the recipe's parts away, one at a time.")
+    _check(args)
+    told = Console(stderr=True)
+    for seed in () if args.table else args.seeds:
+        for lever in args.levers:
+            path = args.out / f"{lever}.{seed}.json"
+            if path.exists():
+                _check_same(path, lever, args)
+                continue
+            told.print(f"{lever}, seed {seed}")
+            write_json(path, _judged(lever, seed, args))
+    rows = table(args.out, args.levers, args.seeds)
+    if args.json:
+        print(json.dumps(without_nan(rows)))
+    elif rows:
+        print_table("mean over seeds (smallest to largest)", rows, list(rows[0]))
+    return 0
+
+
+def table(directory: Path, levers: Sequence[str], seeds: Sequence[int]) -> list[dict[str, Any]]:
+    """Return a row for each lever of which there is a file, over those of its seeds that there are.
+
+    Raises:
+        MuteError: If a file cannot be read.
+    """
+    rows = []
+    for lever in levers:
+        paths = [directory / f"{lever}.{seed}.json" for seed in seeds]
+        paths = [path for path in paths if path.exists()]
+        if not paths:
+            continue
+        found = [read_json(path) for path in paths]
+        figures = [_figures(path, one) for path, one in zip(paths, found, strict=True)]
+        met = [sum(each["met"] for each in one.values()) for one in figures]
+        spread = {
+            title: _spread([one[name]["value"] for one in figures])
+            for title, name in _FIGURES.items()
+        }
+        rows.append({"lever": lever, "seeds": len(found), "targets met": _spread(met)} | spread)
+    return rows
+
+
+def _figures(path: Path, content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Return a file's figures by their names.
+
+    Raises:
+        MuteError: If one that the table shows is missing.
+    """
+    figures = {each["name"]: each for each in content["figures"]}
+    missing = [name for name in _FIGURES.values() if name not in figures]
+    if missing:
+        raise MuteError(f"{path} lacks the figure {missing[0]!r}; measure it anew")
+    return figures
+
+
+def _check(args: LeversArgs) -> None:
+    check_distinct("levers", args.levers)
+    check_distinct("seeds", args.seeds)
+    for lever in args.levers:
+        if lever not in LEVERS:
+            raise MuteError(f"--levers must be of {', '.join(LEVERS)}, got {lever!r}")
+    for seed in args.seeds:
+        check_seed(seed)
+    check_option("robots", args.robots, MANY_ROBOTS)
+    if args.iterations is not None:
+        check_option("iterations", args.iterations, Range(1, 10**9, whole=True))
+
+
+def _conditions(lever: str, args: LeversArgs) -> dict[str, Any]:
+    """Return what a training and its judgement depend on, but for the seed and the code."""
+    iterations = args.iterations or make_task(DEFAULT_TASK).agent.iterations
+    return {
+        "flags": f"{LEVERS[lever]} {_PHYSICS}".split(),
+        "iterations": iterations,
+        "robots": args.robots,
+    }
+
+
+def _check_same(path: Path, lever: str, args: LeversArgs) -> None:
+    """Refuse what was found under other conditions.
+
+    Raises:
+        MuteError: If a file tells of any.
+    """
+    found = read_json(path)
+    for name, value in _conditions(lever, args).items():
+        if found.get(name) != value:
+            raise MuteError(f"{path} has {name} {found.get(name)}, not {value}; move it away")
+
+
+def _judged(lever: str, seed: int, args: LeversArgs) -> dict[str, Any]:
+    """Train without a lever, and return how reliable the walk is."""
+    conditions = _conditions(lever, args)
+    iterations, flags = conditions["iterations"], conditions["flags"]
+    run = args.log_dir / DEFAULT_TASK / f"{lever}.{seed}.{iterations}"
+    policy = run / f"model_{iterations - 1}.pt"
+    if not policy.exists():
+        saved = sorted(run.glob("model_*.pt"), key=lambda path: int(path.stem.split("_")[1]))
+        begin = ["--resume", str(saved[-1])] if saved else ["--seed", str(seed)]
+        place = [] if saved else ["--log-dir", str(args.log_dir), "--run-name", run.name]
+        size = ["--iterations", str(iterations)]
+        _run("train.py", "--task", DEFAULT_TASK, "--plain", *begin, *place, *size, *flags)
+    found = run / "reliability"
+    counts = ["--robots", str(args.robots)]
+    _run("evaluate.py", "reliability", "--policy", str(policy), *counts, "--out", str(found))
+    content = read_json(found / "reliability.json")
+    del content["tables"], content["policy"]
+    return {"lever": lever} | content | conditions
+
+
+def _run(script: str, *words: str) -> None:
+    """Run one of the project's programs, of which only errors are shown.
+
+    Raises:
+        MuteError: If it fails.
+    """
+    status = run_program([sys.executable, str(_ROOT / script), *words])
+    if status:
+        raise MuteError(f"`{script} {' '.join(words)}` ended with status {status}")
+
+
+def _spread(values: Sequence[float | None]) -> str:
+    """Return a mean with the smallest and the largest; None is a figure that there is not."""
+    numbers = [value for value in values if value is not None]
+    if not numbers:
+        return "none"
+    low, high = min(numbers), max(numbers)
+    missing = f", {len(values) - len(numbers)} without" if len(numbers) < len(values) else ""
+    return f"{statistics.fmean(numbers):.3g} ({low:.3g} to {high:.3g}{missing})"
+
+
+if __name__ == "__main__":
+    run_cli(main)

@@ -1,0 +1,140 @@
+"""Tests of the comparison that takes the recipe's parts away."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks import levers
+from benchmarks.levers import LEVERS, table
+from mute.learning.resumption import flat_fields
+from mute.support.errors import MuteError
+from mute.support.provenance import REPOSITORY
+from mute.tasks import DEFAULT_TASK, make_task
+
+
+@pytest.mark.parametrize("lever", [name for name in LEVERS if name != "recipe"])
+def test_each_lever_takes_away_what_the_recipe_has(lever):
+    fields = flat_fields(make_task(DEFAULT_TASK))
+    words = LEVERS[lever].split()
+    while words:
+        option = words.pop(0).removeprefix("--")
+        path = option.replace("agent.no-", "agent.").replace("-", "_")
+        taken = False if path != option.replace("-", "_") else float(words.pop(0))
+        assert fields[path] != taken, path
+
+
+def _content(met: int, starts: float | None) -> dict[str, Any]:
+    names = list(levers._FIGURES.values())
+    figures = [{"name": name, "value": 0.5, "met": index < met} for index, name in enumerate(names)]
+    figures[0]["value"] = starts
+    return {"figures": figures, "tables": {"starts": []}, "policy": "somewhere"}
+
+
+class _Programs:
+    """Stands in for the project's programs; a training and an evaluation leave their files."""
+
+    def __init__(self) -> None:
+        self.commands: list[list[str]] = []
+        self.status = 0
+
+    def __call__(self, command: list[str]) -> int:
+        self.commands.append(command[1:])
+        if "--out" in command:
+            found = Path(command[command.index("--out") + 1])
+            found.mkdir(parents=True)
+            (found / "reliability.json").write_text(json.dumps(_content(2, 1.0)))
+        return self.status
+
+
+@pytest.fixture
+def programs(monkeypatch) -> _Programs:
+    programs = _Programs()
+    monkeypatch.setattr(levers, "run_program", programs)
+    return programs
+
+
+def _main(directory: Path, *words: str) -> int:
+    places = ["--log-dir", str(directory / "runs"), "--out", str(directory / "found")]
+    return levers.main([*places, "--iterations", "30", *words])
+
+
+def test_each_is_trained_and_judged_once(programs, tmp_path, capsys):
+    words = ("--levers", "no_go_signal", "--seeds", "0", "1", "--json")
+    assert _main(tmp_path, *words) == 0
+    scripts = [Path(command[0]).name for command in programs.commands]
+    assert scripts == ["train.py", "evaluate.py"] * 2
+    training = programs.commands[2]
+    assert {"--agent.no-go-signal", "--env.scene.timestep"} <= set(training)
+    assert training[training.index("--seed") + 1] == "1"
+    kept = json.loads((tmp_path / "found/no_go_signal.1.json").read_text())
+    assert kept["flags"][0] == "--agent.no-go-signal"
+    assert "tables" not in kept
+    capsys.readouterr()
+    assert _main(tmp_path, *words) == 0
+    assert len(programs.commands) == 4
+    [row] = json.loads(capsys.readouterr().out)
+    assert (row["seeds"], row["targets met"]) == (2, "2 (2 to 2)")
+
+
+def test_a_training_that_was_stopped_goes_on_from_its_last_checkpoint(programs, tmp_path):
+    run = tmp_path / "runs" / DEFAULT_TASK / "recipe.0.30"
+    run.mkdir(parents=True)
+    for iteration in (0, 9, 10):
+        (run / f"model_{iteration}.pt").touch()
+    assert _main(tmp_path, "--levers", "recipe", "--seeds", "0") == 0
+    training = programs.commands[0]
+    assert training[training.index("--resume") + 1] == str(run / "model_10.pt")
+    assert "--seed" not in training and "--run-name" not in training
+
+
+def test_a_program_that_fails_is_named_and_nothing_is_kept(programs, tmp_path):
+    programs.status = 2
+    with pytest.raises(MuteError, match=r"train\.py .*status 2"):
+        _main(tmp_path, "--levers", "recipe", "--seeds", "0")
+    assert not (tmp_path / "found").exists()
+
+
+def test_the_table_gives_mean_and_ends_and_says_what_is_not_there(tmp_path):
+    for seed, (met, starts) in enumerate([(5, 1.0), (2, 0.5), (2, None)]):
+        (tmp_path / f"recipe.{seed}.json").write_text(json.dumps(_content(met, starts)))
+    [row] = table(tmp_path, ["recipe", "no_pushes"], [0, 1, 2, 3])
+    assert row["seeds"] == 3
+    assert row["targets met"] == "3 (2 to 5)"
+    assert row["starts, beta 1"] == "0.75 (0.5 to 1, 1 without)"
+
+
+def test_what_was_found_under_other_conditions_is_not_taken_for_this(programs, tmp_path):
+    words = ("--levers", "recipe", "--seeds", "0")
+    assert _main(tmp_path, *words) == 0
+    with pytest.raises(MuteError, match=r"recipe\.0\.json has robots 64, not 8"):
+        _main(tmp_path, *words, "--robots", "8")
+
+
+def test_a_file_that_lacks_a_figure_is_named(tmp_path):
+    (tmp_path / "recipe.0.json").write_text(json.dumps({"figures": []}))
+    with pytest.raises(MuteError, match=r"recipe\.0\.json lacks the figure 'robots that go"):
+        table(tmp_path, ["recipe"], [0])
+
+
+@pytest.mark.parametrize("file", sorted((REPOSITORY / "docs" / "reliability").glob("seed?.json")))
+def test_the_figures_of_the_table_are_figures_of_the_exam(file):
+    names = {figure["name"] for figure in json.loads(file.read_text())["figures"]}
+    assert set(levers._FIGURES.values()) <= names
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--seeds", "1", "1"], r"--seeds.*1 again"),
+        (["--levers", "no_legs"], r"--levers.*'no_legs'"),
+        (["--seeds", "-1"], r"--seed .*-1"),
+        (["--robots", "0"], r"--robots.*0"),
+    ],
+)
+def test_bad_input_is_one_line_that_names_it(words, named, tmp_path):
+    with pytest.raises(MuteError, match=named):
+        _main(tmp_path, *words)
