@@ -2,7 +2,8 @@
 
 The robot's two sides are nearly alike (centres of mass lie millimetres off), and so are the
 commands: a network that knows that learns from one turn what the other takes. Its mean action
-cannot choose a side where nothing that it sees does; the robot's bias and its past do that.
+cannot choose a side where nothing that it sees does; the robot's bias and its past do that, or a
+leading side, by which a first layer alone need not commute with the mirror.
 """
 
 from __future__ import annotations
