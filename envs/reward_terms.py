@@ -378,6 +378,19 @@ def soft_steps(motion: Motion, speed: float, period: float, target: float) -> to
     return earned.sum(dim=1) * _asked_to_move(motion)
 
 
+@register_term(
+    "lift",
+    above=Parameter(0.6, "landing speed from which on it counts, m/s", Range(0.0, 100.0)),
+)
+def stamping(motion: Motion, above: float) -> torch.Tensor:
+    """Penalise hard landings alone: the square of what is above a landing speed.
+
+    Sum over the feet that land; not in the paper. What lands softer than that is left to the terms
+    of the quiet factor.
+    """
+    return (motion.landing_speed - above).clamp(min=0.0).square().sum(dim=1)
+
+
 def _lin_vel_error_sq(motion: Motion) -> torch.Tensor:
     """Return |v_xy^cmd - v_xy|^2, (m/s)^2. Shape: (num_envs,)."""
     return (motion.command[:, :2] - motion.base_lin_vel[:, :2]).square().sum(dim=1)

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import onnxruntime
 import pytest
+import run_onnx as example
 import torch
+from other_go1 import write_menagerie_like_go1, write_motor_go1
 from places import REPOSITORY
 from tensordict import TensorDict
 
 from mute.controllers import LearnedController, load_policy
 from mute.envs.quadruped_env import QuadrupedEnv
-from mute.evaluation.reliability.starts import starts_of
+from mute.evaluation.reliability.conditions import BETAS, under_conditions
+from mute.evaluation.reliability.parts import PARTS
+from mute.evaluation.reliability.starts import COMMANDS, starts_of
 from mute.evaluation.tables import read_json
 from mute.evaluation.trials import evaluation_cfg, from_the_stance, run_trial
 
@@ -49,12 +56,65 @@ def test_beta_lowers_the_landing_speed_and_the_feet_still_lift(gaits):
     assert min(loud.apex_mean, quiet.apex_mean) > 0.02
 
 
-def test_told_to_turn_from_the_exact_stance_it_goes_at_every_beta(policy):
-    cfg = evaluation_cfg(policy.cfg.env, 3, 10.0, seed=0)
+def test_from_the_exact_stance_it_goes_on_every_command_at_every_beta(policy):
+    cfg = evaluation_cfg(policy.cfg.env, len(BETAS), 10.0, seed=0)
     env = QuadrupedEnv(from_the_stance(cfg))
-    rows = starts_of(env, LearnedController(policy, 3), lambda work: None)
-    turning = [row for row in rows if row.command == "0.6 rad/s turning"]
-    assert [(row.beta, row.share) for row in turning] == [(0.0, 1.0), (0.5, 1.0), (1.0, 1.0)]
+    rows = starts_of(env, LearnedController(policy, len(BETAS)), lambda work: None)
+    assert [(row.beta, row.command) for row in rows if row.share < 1.0] == []
+    assert len(rows) == len(BETAS) * len(COMMANDS)
+
+
+@pytest.mark.parametrize("write_model", [write_motor_go1, write_menagerie_like_go1])
+@pytest.mark.parametrize("beta", [0.0, 1.0])
+def test_its_exported_file_goes_on_models_that_are_not_ours(
+    write_model: Callable[[Path], Path], beta: float, tmp_path: Path
+):
+    policy = example.OnnxPolicy(RESOURCES / "go1_mute.onnx")
+    model = write_model(tmp_path / "other.xml")
+    for name, velocity in COMMANDS.items():
+        policy.reset()
+        command = dict(zip(policy.command_names, (*velocity, beta), strict=True))
+        summary = example.walk(
+            policy, example.Robot(model, policy), command, stand=3.0, seconds=3.0
+        )
+        assert not summary.fallen, name
+        assert summary.followed >= example.GOING, name
+
+
+@pytest.fixture(scope="module")
+def exam(policy):
+    """Examine it as `evaluate.py reliability` does, with few robots."""
+    examined = under_conditions(policy)
+    parts = ("starts", "follows", "stands", "falls")
+    results = [PARTS[name].measure(examined, 16, 3, lambda work: None) for name in parts]
+    return {figure.name: figure.value for result in results for figure in result.figures}
+
+
+def test_randomised_robots_with_noisy_sensors_start(exam):
+    shares = [value for name, value in exam.items() if name.startswith("robots that go")]
+    assert len(shares) == len(BETAS)
+    assert min(shares) >= 0.9
+
+
+def test_randomised_robots_follow_slow_and_fast_commands(exam):
+    assert exam["smallest actual over commanded speed, beta 0"] >= 0.8
+    assert exam["largest actual over commanded speed, beta 0"] <= 1.2
+    assert exam["smallest actual over commanded speed, beta 1"] >= 0.6
+    assert exam["squared velocity error, beta 0"] <= 0.03
+    assert exam["squared velocity error, beta 1"] <= 0.06
+
+
+def test_randomised_robots_stand_in_silence_and_take_a_push(exam):
+    assert exam["robots whose feet are down and stay down, at the worst beta"] == 1.0
+    assert exam["robots still again 3 s after a push, at the worst beta"] >= 0.8
+    assert exam["joint speed without noise, at the worst beta"] <= 0.04
+    assert exam["level at the trunk, at the worst beta"] <= 57.0
+
+
+def test_randomised_robots_do_not_fall(exam):
+    falls = [value for name, value in exam.items() if "fall" in name]
+    assert len(falls) >= 2
+    assert max(falls) == 0.0
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mute.command_lines.arguments import command_line, make_directory, parse
 from mute.command_lines.card_benchmark import BenchmarkFiles, benchmark_page
@@ -36,7 +37,8 @@ class CardArgs:
     """File that `evaluate.py noise` wrote; those of the sweeps and of the walk lie beside it."""
     reliability: Path = _DOCS / "reliability"
     """Directory of what `evaluate.py reliability` wrote of several seeds, as seed0.json, seed1.json
-    and so on, with what `evaluate.py progress` wrote of each as seed0_progress.json."""
+    and so on, with what `evaluate.py progress` wrote of each as seed0_progress.json, and
+    `evaluate.py gait` as seed0_gait.json."""
     benchmark: Path = _DOCS / "benchmark.json"
     """File that `mute.benchmark --out` wrote; peers.json, peer_walks.json, physics.json and
     walking.json lie beside it."""
@@ -73,20 +75,22 @@ def read_results(args: CardArgs) -> ResultFiles:
         MuteError: If one is missing, or not what the command wrote.
     """
     beside = args.noise.parent
+    card = _read(args.card, "seed", "figures", "command")
+    seeds = read_seeds(args.reliability)
+    shipped = seeds.get(card["seed"])
+    if shipped is None or shipped.gait is None:
+        name = f"seed{card['seed']}"
+        raise MuteError(
+            f"no {name}.json and {name}_gait.json, of what ships, in {args.reliability}"
+        )
     return ResultFiles(
-        card=_read(args.card),
-        trainings={
-            "seed 0, commit f3815da": _read(_DOCS / "seeds" / "seed0_f3815da.json"),
-            "seed 0, commit af4151a": _read(_DOCS / "seeds" / "seed0_af4151a.json"),
-            "seed 1, commit between the first two": _read(_DOCS / "seeds" / "seed1.json"),
-        },
-        progress=_read(_DOCS / "progress.json"),
+        card=card,
+        seeds=seeds,
         paper_task=_read(_DOCS / "go1_mute_paper.json"),
         noise=_read(args.noise),
         sweep_speed=_read(beside / "sweep_speed.json"),
         sweep_beta=_read(beside / "sweep_beta.json"),
         walk=_read(beside / "walk.json"),
-        reliability=read_seeds(args.reliability),
     )
 
 
@@ -107,7 +111,11 @@ def read_benchmarks(args: CardArgs) -> BenchmarkFiles:
     )
 
 
-def _read(path: Path):  # noqa: ANN202
+def _read(path: Path, *keys: str) -> Any:  # noqa: ANN401
     if not path.is_file():
         raise MuteError(f"no file at {path}")
-    return read_json(path)
+    content = read_json(path)
+    missing = [key for key in keys if not isinstance(content, dict) or key not in content]
+    if missing:
+        raise MuteError(f"{path} lacks '{missing[0]}'")
+    return content

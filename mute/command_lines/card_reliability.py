@@ -14,7 +14,7 @@ from mute.evaluation.reliability.figures import Figure, Target, shown
 from mute.evaluation.tables import read_json
 from mute.support.errors import MuteError
 
-__all__ = ["SeedFiles", "read_seeds", "reliability_section"]
+__all__ = ["SeedFiles", "median_seed", "read_seeds", "reliability_section", "unmet"]
 
 _COLUMNS = {
     "part": ("part", "{}"),
@@ -37,10 +37,25 @@ class SeedFiles:
     """What `evaluate.py reliability` wrote."""
     progress: Mapping[str, Any] | None = None
     """What `evaluate.py progress` wrote of the same training, if it is there."""
+    gait: Mapping[str, Any] | None = None
+    """What `evaluate.py gait` wrote of the same policy, if it is there."""
+
+    @property
+    def targets_met(self) -> int:
+        """How many targets it meets."""
+        return sum(figure["met"] for figure in self.figures)
+
+    @property
+    def figures(self) -> list[Mapping[str, Any]]:
+        """All its figures with a target, how soon it walks among them where that is known."""
+        walking = _walking(self)
+        return [*self.reliability["figures"], *([] if walking is None else [walking])]
 
 
 def read_seeds(folder: Path) -> dict[int, SeedFiles]:
-    """Return by seed what is in `seedN.json` and `seedN_progress.json`, in the seeds' order.
+    """Return by seed what is in `seedN.json`, `seedN_progress.json` and `seedN_gait.json`.
+
+    In the order of the seeds.
 
     Raises:
         MuteError: If a file is not what the command wrote, or of a training with another seed.
@@ -55,6 +70,23 @@ def read_seeds(folder: Path) -> dict[int, SeedFiles]:
     return files
 
 
+def median_seed(seeds: Mapping[int, SeedFiles]) -> int:
+    """Return the seed in the middle, by targets met and then by how much slower beta 1 lands.
+
+    Of an even number of seeds it is the lesser one of the two in the middle.
+
+    Args:
+        seeds: Files of one seed or more.
+    """
+    order = sorted(seeds, key=lambda seed: (seeds[seed].targets_met, _slower(seeds[seed]), seed))
+    return order[(len(order) - 1) // 2]
+
+
+def _slower(run: SeedFiles) -> float:
+    figure = _figure(run, "beta", "landings slower at beta 1, at 0.5 m/s")
+    return -math.inf if figure is None or _missing(figure["value"]) else figure["value"]
+
+
 def reliability_section(seeds: Mapping[int, SeedFiles]) -> str:
     """Return the section: mean, smallest and largest of every figure, and who meets its target.
 
@@ -65,38 +97,79 @@ def reliability_section(seeds: Mapping[int, SeedFiles]) -> str:
     robots = {run.reliability["robots"] for run in runs}
     names = ", ".join(map(str, seeds))
     figures = dict.fromkeys(
-        (figure["part"], figure["name"]) for run in runs for figure in run.reliability["figures"]
+        (figure["part"], figure["name"]) for run in runs for figure in run.figures
     )
     rows = [_row([_figure(run, *name) for run in runs]) for name in figures]
-    if any(run.progress is not None for run in runs):
-        rows.append(_row([_walking(run) for run in runs]))
     return (
         "## Whether one can rely on it\n\n"
         f"{markdown(rows, _COLUMNS)}\n\n"
-        f"Over the seeds {names}, each `python train.py --task go1_mute`, then `python "
-        f"evaluate.py reliability` with {' or '.join(map(str, sorted(robots)))} robots "
-        "(`docs/reliability/`). Unlike elsewhere on this page, robots here have randomised physics "
-        "and noisy sensors, unless the figure says else. What one "
-        "seed never reached has no mean: never. What each figure is, is in "
-        "[commands.md](commands.md)."
+        f"Over the seeds {names}, each `python train.py --task go1_mute --seed SEED "
+        "--agent.save-interval 10`, then `python evaluate.py reliability` with "
+        f"{' or '.join(map(str, sorted(robots)))} robots, and `python evaluate.py progress "
+        "--randomized` (`docs/reliability/`). Unlike elsewhere on this page, robots here have "
+        "randomised physics and noisy sensors, unless the figure says else. What one seed never "
+        "reached has no mean: never. What each figure is, is in "
+        f"[commands.md](commands.md). Of {len(rows)} targets they meet "
+        f"{_listed(runs)}; in the middle, by that and then by how much slower beta 1 lands at "
+        f"0.5 m/s, is seed {median_seed(seeds)}."
     )
+
+
+def unmet(seeds: Mapping[int, SeedFiles]) -> str:
+    """Return in words which targets are not met, and by which seeds; an empty text if all are."""
+    missed: dict[str, list[str]] = {}
+    for seed, run in seeds.items():
+        for figure in run.figures:
+            if not figure["met"]:
+                told = f"{figure['name']} {figure['target']} ({figure['part']})"
+                value = _told(figure["value"], figure["unit"])
+                missed.setdefault(told, []).append(f"seed {seed}: {value}")
+    return "; ".join(f"{name}: {', '.join(values)}" for name, values in missed.items())
+
+
+def _listed(runs: Sequence[SeedFiles]) -> str:
+    *others, last = [str(run.targets_met) for run in runs]
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def _read(path: Path) -> SeedFiles:
     reliability = read_json(path)
     if not (isinstance(reliability, dict) and {"figures", "robots"} <= reliability.keys()):
         raise MuteError(f"{path} is nothing that `evaluate.py reliability` wrote")
-    beside = path.with_name(f"{path.stem}_progress.json")
-    progress = read_json(beside) if beside.is_file() else None
-    if progress is not None and "checkpoints" not in progress:
-        raise MuteError(f"{beside} is nothing that `evaluate.py progress` wrote")
-    return SeedFiles(reliability, progress)
+    beside = {
+        command: _read_beside(path, command, keys, reliability) for command, keys in _BESIDE.items()
+    }
+    return SeedFiles(reliability, **beside)
+
+
+_BESIDE = {
+    "progress": {"checkpoints"},
+    "gait": {"at_speed", "range", "trials", "seconds"},
+}
+"""What other commands write of the same training, and the keys that are read of it."""
+_SAME = ("policy_sha256", "trained_seed")
+"""What two files of one training say alike, where both say it."""
+
+
+def _read_beside(
+    path: Path, command: str, keys: set[str], reliability: Mapping[str, Any]
+) -> Mapping[str, Any] | None:
+    """Return what another command wrote of the same training, None if it did not."""
+    beside = path.with_name(f"{path.stem}_{command}.json")
+    content = read_json(beside) if beside.is_file() else None
+    if content is None:
+        return None
+    if not (isinstance(content, dict) and keys <= content.keys()):
+        raise MuteError(f"{beside} is nothing that `evaluate.py {command}` wrote")
+    for name in _SAME:
+        if reliability.get(name) != content.get(name, reliability.get(name)):
+            raise MuteError(f"{beside} is not of the training of {path}: {name} differs")
+    return content
 
 
 def _figure(run: SeedFiles, part: str, name: str) -> Mapping[str, Any] | None:
     """Return a figure of a run; None where it was not measured."""
-    figures = run.reliability["figures"]
-    return next((f for f in figures if (f["part"], f["name"]) == (part, name)), None)
+    return next((f for f in run.figures if (f["part"], f["name"]) == (part, name)), None)
 
 
 def _walking(run: SeedFiles) -> Mapping[str, Any] | None:
@@ -108,7 +181,8 @@ def _walking(run: SeedFiles) -> Mapping[str, Any] | None:
         return None
     first = next((row for row in run.progress["checkpoints"] if row["walks"]), None)
     steps = math.inf if first is None else first["steps"] / 1e6
-    return Figure("walks", "million steps until it walks", steps, "", _WALKS).as_dict()
+    exact = "" if run.progress.get("randomized") else ", the exact robot"
+    return Figure("walks", f"million steps until it walks{exact}", steps, "", _WALKS).as_dict()
 
 
 def _row(figures: Sequence[Mapping[str, Any] | None]) -> dict[str, Any]:

@@ -90,10 +90,10 @@ class PlayArgs(PolicyArgs):
     """Seed of the first states and of the noise in the sound."""
     num_envs: int = 1
     """Number of robots; the first is shown and heard, all other figures are of all."""
-    begin: Literal["moving", "standing"] = "moving"
-    """How robots begin: moving, near the stance with a little speed in any direction, as in
-    training; standing, at rest in the exact stance (several robots each a little beside it), with
-    the command half a second later."""
+    begin: Literal["standing", "moving"] = "standing"
+    """How robots begin: standing, at rest in the exact stance (several robots each a little beside
+    it), with the command half a second later; moving, near the stance with a little speed in any
+    direction, as in training."""
     surface: str | None = None
     """Floor to walk on and to hear, with physics at 1 ms: wood, carpet, tile or concrete. Unless
     given, training's floor and physics, with a level (modelled, sounding as wood); with --wav or

@@ -132,6 +132,7 @@ CASES = {
         },
         [0.4 + 0.4 * math.exp(-1.0), 0.0],
     ),
+    "stamping": ({"landing_speed": [[0.7, 1.1, 0.5], [0.6]]}, [0.01 + 0.25, 0.0]),
     "fall": ({"fallen": [False, True]}, [0.0, 1.0]),
 }
 
@@ -162,6 +163,7 @@ def test_a_function_gives_what_was_computed_by_hand(name):
         ("base_height", {"desired": 0.5}, 0.25),
         ("foot_clearance", {"target": 0.2}, 0.01 + 3 * 0.04 * 0.0),
         ("touchdown_apex", {"target": 0.1}, 0.4),
+        ("stamping", {"above": 0.1}, 0.01),
         ("stepping", {"period": 0.3}, 0.3),
         ("stepping", {"target": 0.12}, 0.25),
         ("soft_steps", {"speed": 0.2}, 0.5 * math.exp(-1.0)),
@@ -197,6 +199,7 @@ def test_every_parameter_of_every_function_was_tried():
     tried |= {("near_ground_drop", "depth"), ("base_height", "desired")}
     tried |= {("foot_clearance", "target"), ("touchdown_apex", "target")}
     tried |= {("stepping", "period"), ("stepping", "target"), ("feet_lifted", "speed")}
+    tried |= {("stamping", "above")}
     tried |= {("soft_steps", key) for key in ("speed", "period", "target")}
     assert tried == {
         (name, key) for name, function in REWARD_FUNCTIONS.items() for key in function.parameters

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import math
 import re
 
@@ -18,8 +19,20 @@ from mute.envs.rewards import RewardsCfg, paper_terms, reward_term
 from mute.tasks import make_task, task_names
 
 
+def _task_of_then() -> TaskCfg:
+    """Return `go1_mute` with such terms alone as there were while weights were fields."""
+    cfg = make_task("go1_mute")
+    weights = {name: term.weight for name, term in cfg.env.rewards.terms.items()}
+    cfg.env.rewards.terms = {
+        name: dataclasses.replace(term, weight=weights[name])
+        for name, term in earlier_terms().items()
+        if name in weights
+    }
+    return cfg
+
+
 def _with_flat_rewards(**changed: float) -> dict:
-    return flat_rewards(to_plain(make_task("go1_mute")), **changed)
+    return flat_rewards(to_plain(_task_of_then()), **changed)
 
 
 def _with_old_heights(offset: float, scale: float) -> dict:
@@ -45,7 +58,7 @@ def test_an_engine_that_is_gone_becomes_the_one_that_took_its_place():
 
 
 def test_weights_that_were_fields_become_the_terms_that_they_weighed():
-    assert from_plain(_with_flat_rewards()) == make_task("go1_mute")
+    assert from_plain(_with_flat_rewards()) == _task_of_then()
 
 
 def test_a_constant_of_all_rewards_becomes_a_parameter_of_its_term():
@@ -53,7 +66,7 @@ def test_a_constant_of_all_rewards_becomes_a_parameter_of_its_term():
     terms = from_plain(_with_flat_rewards(**changed)).env.rewards.terms
     assert terms["base_height"] == reward_term("base_height", -1.0, desired=0.28)
     assert terms["foot_clearance"] == reward_term("foot_clearance", -20.0, target=0.05)
-    assert terms["touchdown_apex"] == reward_term("touchdown_apex", -2.0, target=0.03)
+    assert terms["touchdown_apex"] == reward_term("touchdown_apex", -4.0, target=0.03)
 
 
 @pytest.mark.parametrize(

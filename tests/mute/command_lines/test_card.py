@@ -10,6 +10,7 @@ import pytest
 from places import REPOSITORY
 
 from mute.command_lines import card
+from mute.command_lines.card_reliability import median_seed
 from mute.command_lines.card_results import results_page, summary
 from mute.command_lines.card_tables import markdown, mean_and_spread
 from mute.support.errors import MuteError
@@ -39,11 +40,9 @@ def test_without_a_directory_both_pages_are_printed(capsys):
 
 
 def test_a_spread_is_that_of_the_trainings(files):
-    runs = list(files.all_trainings.values())
-    assert [run["at_speed"][0]["landing_speed_mean"] for run in runs] == pytest.approx(
-        [0.461, 0.369, 0.470, 0.617], abs=5e-4
-    )
-    assert "| 0 | 0 of 640 | 0.009 ± 0.001 | 0.48 ± 0.10 |" in summary(files)
+    speeds = [run["at_speed"][0]["landing_speed_mean"] for run in files.gaits.values()]
+    assert len(speeds) == 5
+    assert f" {mean_and_spread(speeds, '{:.2f}')} |" in summary(files)
 
 
 def test_a_mean_has_the_sample_standard_deviation_beside_it():
@@ -51,11 +50,19 @@ def test_a_mean_has_the_sample_standard_deviation_beside_it():
 
 
 def test_a_robot_that_fell_in_one_training_is_counted(files):
-    fallen = dict(files.trainings)
-    name, run = next(iter(fallen.items()))
-    worse = [row | {"fall_rate": 2.0 / run["trials"]} for row in run["range"]]
-    fallen[name] = {**run, "range": worse}
-    assert "| 0 | 2 of 640 |" in summary(dataclasses.replace(files, trainings=fallen))
+    seed, run = next(iter(files.seeds.items()))
+    gaits = [each["range"][0]["fall_rate"] * each["trials"] for each in files.gaits.values()]
+    robots = sum(each["trials"] for each in files.gaits.values())
+    first, *others = run.gait["range"]
+    worse = [first | {"fall_rate": first["fall_rate"] + 2.0 / run.gait["trials"]}, *others]
+    fallen = files.seeds | {seed: dataclasses.replace(run, gait=run.gait | {"range": worse})}
+    changed = summary(dataclasses.replace(files, seeds=fallen))
+    assert f"| 0 | {round(sum(gaits)) + 2} of {robots} |" in changed
+
+
+def test_the_policy_that_ships_is_the_one_in_the_middle(files):
+    assert sorted(files.seeds) == [0, 1, 2, 3, 4]
+    assert files.card["seed"] == median_seed(files.seeds)
 
 
 def test_what_the_level_loses_with_beta_is_compared_at_equal_actual_speed(files):

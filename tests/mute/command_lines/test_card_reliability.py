@@ -7,10 +7,16 @@ import json
 import pytest
 
 from mute.command_lines import card
-from mute.command_lines.card_reliability import read_seeds, reliability_section
+from mute.command_lines.card_reliability import (
+    median_seed,
+    read_seeds,
+    reliability_section,
+    unmet,
+)
 from mute.evaluation.reliability.figures import Figure, Target
-from mute.evaluation.tables import write_json
+from mute.evaluation.tables import read_json, write_json
 from mute.support.errors import MuteError
+from mute.support.resources import RESOURCES
 
 
 def _falls(value: float) -> Figure:
@@ -55,7 +61,9 @@ def test_the_steps_until_a_training_walks_are_read_from_its_progress(tmp_path):
         _write(tmp_path, seed, _falls(0.0))
         checkpoints = [{"steps": 100, "walks": False}]
         checkpoints += [{"steps": steps, "walks": True}] if steps else []
-        write_json(tmp_path / f"seed{seed}_progress.json", {"checkpoints": checkpoints})
+        write_json(
+            tmp_path / f"seed{seed}_progress.json", {"randomized": True, "checkpoints": checkpoints}
+        )
     assert _rows(tmp_path)[1] == (
         "| walks | million steps until it walks | never | 2 | never | <= 3 | 1 of 3 |"
     )
@@ -65,10 +73,39 @@ def test_trainings_that_all_walk_have_the_mean_of_their_steps(tmp_path):
     for seed, steps in enumerate((2_000_000, 4_000_000)):
         _write(tmp_path, seed, _falls(0.0))
         checkpoints = [{"steps": steps, "walks": True}]
-        write_json(tmp_path / f"seed{seed}_progress.json", {"checkpoints": checkpoints})
+        write_json(
+            tmp_path / f"seed{seed}_progress.json", {"randomized": True, "checkpoints": checkpoints}
+        )
     assert _rows(tmp_path)[1] == (
         "| walks | million steps until it walks | 3 | 2 | 4 | <= 3 | 1 of 2 |"
     )
+
+
+def test_steps_of_exact_robots_are_said_to_be_theirs(tmp_path):
+    _write(tmp_path, 0, _falls(0.0))
+    checkpoints = [{"steps": 2_000_000, "walks": True}]
+    write_json(tmp_path / "seed0_progress.json", {"checkpoints": checkpoints})
+    assert "| walks | million steps until it walks, the exact robot | 2 |" in _rows(tmp_path)[1]
+
+
+def test_what_is_not_met_is_told_with_the_seeds_that_miss_it(tmp_path):
+    _write(tmp_path, 0, _falls(0.0), _level(55.0))
+    assert unmet(read_seeds(tmp_path)) == ""
+    _write(tmp_path, 1, _falls(0.02), _level(57.0))
+    _write(tmp_path, 2, _falls(0.0), _level(56.5))
+    assert unmet(read_seeds(tmp_path)) == (
+        "robots that fall < 1.0 % (falls): seed 1: 2.0 %; "
+        "level at the trunk <= 56 dBA (stands): seed 1: 57 dBA, seed 2: 56.5 dBA"
+    )
+
+
+def test_a_file_of_another_training_beside_is_refused(tmp_path):
+    content = {"robots": 64, "policy_sha256": "a", "figures": [_falls(0.0).as_dict()]}
+    write_json(tmp_path / "seed0.json", content)
+    gait = {"at_speed": [], "range": [], "trials": 1, "seconds": 1.0, "policy_sha256": "b"}
+    write_json(tmp_path / "seed0_gait.json", gait)
+    with pytest.raises(MuteError, match=r"seed0_gait\.json .*policy_sha256"):
+        read_seeds(tmp_path)
 
 
 def test_a_file_of_a_training_with_another_seed_than_its_name_is_refused(tmp_path):
@@ -96,10 +133,40 @@ def test_a_file_of_another_command_is_refused_by_name(tmp_path):
         read_seeds(tmp_path)
 
 
-def test_the_page_has_the_table_once_there_are_files(tmp_path, capsys):
-    heading = "## Whether one can rely on it"
-    card.main(["--reliability", str(tmp_path)])
-    assert heading not in capsys.readouterr().out
-    _write(tmp_path, 0, _falls(0.0))
-    card.main(["--reliability", str(tmp_path)])
-    assert heading in capsys.readouterr().out
+def test_a_page_without_the_training_that_ships_is_refused(tmp_path):
+    seed = read_json(RESOURCES / "go1" / "go1_mute.json")["seed"]
+    _write(tmp_path, seed, _falls(0.0))  # but no gait
+    with pytest.raises(MuteError, match=rf"no seed{seed}\.json and seed{seed}_gait\.json"):
+        card.main(["--reliability", str(tmp_path)])
+
+
+def _slower(share: float) -> Figure:
+    return Figure("beta", "landings slower at beta 1, at 0.5 m/s", share, "share", Target(0.35))
+
+
+def test_the_seed_in_the_middle_is_so_by_targets_met_and_then_by_how_much_slower_it_lands(
+    tmp_path,
+):
+    for seed, (falls, share) in enumerate([(0.0, 0.5), (0.0, 0.36), (0.5, 0.6), (0.0, 0.4)]):
+        _write(tmp_path, seed, _falls(falls), _slower(share))
+    assert median_seed(read_seeds(tmp_path)) == 1  # of 2, 1, 3, 0 the lesser in the middle
+    _write(tmp_path, 4, _falls(0.0), _slower(float("nan")))
+    assert median_seed(read_seeds(tmp_path)) == 1  # of 4, 2, 1, 3, 0
+    section = reliability_section(read_seeds(tmp_path))
+    assert "Of 2 targets they meet 2, 2, 1, 2 and 1; in the middle" in section
+    assert "is seed 1." in section
+
+
+def test_what_was_measured_of_a_gait_is_read_and_must_be_that(tmp_path):
+    _write(tmp_path, 2, _falls(0.0))
+    path = tmp_path / "seed2_gait.json"
+    write_json(path, {"at_speed": [], "range": [], "trials": 1, "seconds": 1.0})
+    assert read_seeds(tmp_path)[2].gait == {
+        "at_speed": [],
+        "range": [],
+        "trials": 1,
+        "seconds": 1.0,
+    }
+    write_json(path, {"range": []})
+    with pytest.raises(MuteError, match=r"seed2_gait\.json is nothing that `evaluate\.py gait`"):
+        read_seeds(tmp_path)

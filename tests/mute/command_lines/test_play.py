@@ -259,8 +259,6 @@ def _first_frames(policy: Path, monkeypatch: pytest.MonkeyPatch, *words: str) ->
         "--seconds",
         "1",
         "--json",
-        "--begin",
-        "standing",
         *words,
     )
     assert run.returncode == 0, run.stderr
