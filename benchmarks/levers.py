@@ -10,6 +10,7 @@ share the folders.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import statistics
 import sys
@@ -20,6 +21,7 @@ from typing import Any
 
 from rich.console import Console
 
+from mute.checkpoint import newest_checkpoint
 from mute.command_lines.arguments import (
     MANY_ROBOTS,
     Words,
@@ -29,6 +31,7 @@ from mute.command_lines.arguments import (
     command_line,
     parse,
 )
+from mute.config import to_plain
 from mute.evaluation.tables import print_table, read_json, write_json
 from mute.support.errors import MuteError, run_cli
 from mute.support.plain_data import without_nan
@@ -54,6 +57,7 @@ LEVERS: Mapping[str, str] = {
     "at_once": "--env.rewards.following-acceleration 0 --env.rewards.following-time 0",
     "no_beta_ends": "--env.commands.beta-end-fraction 0",
     "no_slow_commands": "--env.commands.slow-fraction 0 --env.commands.single-axis-fraction 0",
+    "rare_stops": "--env.commands.standing-fraction 0.05 --env.commands.resampling-time 10",
     "no_pushes": "--env.randomization.push-velocity 0",
 }
 """What each training does without, as flags of `train.py`."""
@@ -96,24 +100,27 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status.
 
     Raises:
-        MuteError: If an argument is bad, or a training or its evaluation fails.
+        MuteError: If an argument is bad, what is there was found under other conditions, a training
+            or its evaluation fails, or there is nothing to show.
     """
     argv = command_line() if argv is None else list(argv)
     args = parse(LeversArgs, argv, "Take the recipe's parts away, one at a time.")
     _check(args)
+    # Before hours of training, not after them.
+    _check_same(args)
     told = Console(stderr=True)
     for seed in () if args.table else args.seeds:
         for lever in args.levers:
             path = args.out / f"{lever}.{seed}.json"
-            if path.exists():
-                _check_same(path, lever, args)
-                continue
-            told.print(f"{lever}, seed {seed}")
-            write_json(path, _judged(lever, seed, args))
+            if not path.exists():
+                told.print(f"{lever}, seed {seed}")
+                write_json(path, _judged(lever, seed, args))
     rows = table(args.out, args.levers, args.seeds)
+    if not rows:
+        raise MuteError(f"nothing of these levers and seeds is in {args.out}")
     if args.json:
         print(json.dumps(without_nan(rows)))
-    elif rows:
+    else:
         print_table("mean over seeds (smallest to largest)", rows, list(rows[0]))
     return 0
 
@@ -169,35 +176,44 @@ def _check(args: LeversArgs) -> None:
 
 def _conditions(lever: str, args: LeversArgs) -> dict[str, Any]:
     """Return what a training and its judgement depend on, but for the seed and the code."""
-    iterations = args.iterations or make_task(DEFAULT_TASK).agent.iterations
+    recipe = make_task(DEFAULT_TASK)
     return {
+        "recipe": hashlib.sha256(json.dumps(to_plain(recipe)).encode()).hexdigest()[:8],
         "flags": f"{LEVERS[lever]} {_PHYSICS}".split(),
-        "iterations": iterations,
+        "iterations": args.iterations or recipe.agent.iterations,
         "robots": args.robots,
     }
 
 
-def _check_same(path: Path, lever: str, args: LeversArgs) -> None:
+def _check_same(args: LeversArgs) -> None:
     """Refuse what was found under other conditions.
 
     Raises:
         MuteError: If a file tells of any.
     """
-    found = read_json(path)
-    for name, value in _conditions(lever, args).items():
-        if found.get(name) != value:
-            raise MuteError(f"{path} has {name} {found.get(name)}, not {value}; move it away")
+    for lever in args.levers:
+        conditions = _conditions(lever, args)
+        for seed in args.seeds:
+            path = args.out / f"{lever}.{seed}.json"
+            found = read_json(path) if path.exists() else conditions
+            for name, value in conditions.items():
+                if found.get(name) != value:
+                    raise MuteError(
+                        f"{path} has {name} {found.get(name)}, not {value}; move it away"
+                    )
 
 
 def _judged(lever: str, seed: int, args: LeversArgs) -> dict[str, Any]:
     """Train without a lever, and return how reliable the walk is."""
     conditions = _conditions(lever, args)
     iterations, flags = conditions["iterations"], conditions["flags"]
-    run = args.log_dir / DEFAULT_TASK / f"{lever}.{seed}.{iterations}"
+    run = args.log_dir / DEFAULT_TASK / f"{lever}.{seed}.{iterations}.{conditions['recipe']}"
     policy = run / f"model_{iterations - 1}.pt"
     if not policy.exists():
-        saved = sorted(run.glob("model_*.pt"), key=lambda path: int(path.stem.split("_")[1]))
-        begin = ["--resume", str(saved[-1])] if saved else ["--seed", str(seed)]
+        saved = newest_checkpoint(run) if run.is_dir() else None
+        if saved is None and run.exists():
+            raise MuteError(f"{run} was left before its first checkpoint; remove it")
+        begin = ["--resume", str(saved)] if saved else ["--seed", str(seed)]
         place = [] if saved else ["--log-dir", str(args.log_dir), "--run-name", run.name]
         size = ["--iterations", str(iterations)]
         _run("train.py", "--task", DEFAULT_TASK, "--plain", *begin, *place, *size, *flags)

@@ -43,8 +43,8 @@ def _go1_mute() -> TaskCfg:
         lift_ramp=(48.0, 100.0),
         quiet_ramp=(80.0, 180.0),
     )
-    # Slow commands, a single axis and stops are what people ask for indoors; from fast to the
-    # opposite is what a robot falls by.
+    # Slow commands, a single axis and stops are what people ask for indoors. Many follow each
+    # other, as to turn back from full speed is what a robot falls by.
     commands = CommandsCfg(
         standing_fraction=0.15,
         slow_fraction=0.45,
@@ -59,7 +59,7 @@ def _go1_mute() -> TaskCfg:
     randomization = RandomizationCfg(push_interval=4.0, push_velocity=0.5)
     agent = AgentCfg(
         iterations=750,
-        # Without, the last iteration is one at random: each walks up to 0.1 m/s faster or slower.
+        # Without, the last iteration is one at random: each walks up to 0.15 m/s faster or slower.
         settling_share=0.3,
         actor_hidden=(128, 128, 64),
         critic_hidden=(128, 128, 64),
@@ -102,7 +102,7 @@ def _stepping() -> dict[str, RewardTermCfg]:
 
 
 def _quiet() -> dict[str, RewardTermCfg]:
-    """Return what beta scales: the paper's terms, and soft steps."""
+    """Return what beta scales, the paper's terms and soft steps, and what it need not wait for."""
     return {
         "foot_drop_velocity": reward_term("foot_drop_velocity", -0.057),
         "foot_raise_velocity": reward_term("foot_raise_velocity", 0.0114),

@@ -6,14 +6,14 @@ page names the command. What stands where is `card_results`' and `card_benchmark
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mute.command_lines.arguments import command_line, make_directory, parse
 from mute.command_lines.card_benchmark import BenchmarkFiles, benchmark_page
-from mute.command_lines.card_reliability import read_seeds
+from mute.command_lines.card_reliability import SeedFiles, read_seeds
 from mute.command_lines.card_results import ResultFiles, results_page
 from mute.evaluation.tables import read_json
 from mute.support.errors import MuteError
@@ -75,14 +75,9 @@ def read_results(args: CardArgs) -> ResultFiles:
         MuteError: If one is missing, or not what the command wrote.
     """
     beside = args.noise.parent
-    card = _read(args.card, "seed", "figures", "command")
+    card = _read(args.card, *_CARD)
     seeds = read_seeds(args.reliability)
-    shipped = seeds.get(card["seed"])
-    if shipped is None or shipped.gait is None:
-        name = f"seed{card['seed']}"
-        raise MuteError(
-            f"no {name}.json and {name}_gait.json, of what ships, in {args.reliability}"
-        )
+    _check_trainings(args.reliability, card, seeds)
     return ResultFiles(
         card=card,
         seeds=seeds,
@@ -92,6 +87,43 @@ def read_results(args: CardArgs) -> ResultFiles:
         sweep_beta=_read(beside / "sweep_beta.json"),
         walk=_read(beside / "walk.json"),
     )
+
+
+_CARD = (
+    "seed",
+    "figures",
+    "command",
+    "commit",
+    "machine",
+    "iterations",
+    "steps",
+    "wall_time_minutes",
+)
+"""What the page tells of the policy that ships."""
+
+
+def _check_trainings(folder: Path, card: Mapping[str, Any], seeds: Mapping[int, SeedFiles]) -> None:
+    """Refuse trainings that what ships is not one of, or that are not alike.
+
+    Raises:
+        MuteError: If the files of one are missing, or tell of other iterations or betas.
+    """
+    if card["seed"] not in seeds:
+        raise MuteError(f"no seed{card['seed']}.json, of what ships, in {folder}")
+    betas = [row["beta"] for row in card["figures"]["range"]]
+    for seed, run in seeds.items():
+        path = folder / f"seed{seed}_gait.json"
+        if run.gait is None:
+            raise MuteError(f"no file at {path}; `evaluate.py gait` writes it")
+        trained = run.gait.get("iteration")
+        if trained != card["iterations"] - 1:
+            raise MuteError(
+                f"{path} is of iteration {trained}, what ships of {card['iterations'] - 1}"
+            )
+        for part in ("range", "at_speed"):
+            told = [row["beta"] for row in run.gait[part]]
+            if told != betas:
+                raise MuteError(f"{path} has betas {told} in {part}, what ships has {betas}")
 
 
 def read_benchmarks(args: CardArgs) -> BenchmarkFiles:

@@ -14,7 +14,7 @@ from mute.evaluation.reliability.figures import Figure, Target, shown
 from mute.evaluation.tables import read_json
 from mute.support.errors import MuteError
 
-__all__ = ["SeedFiles", "median_seed", "read_seeds", "reliability_section", "unmet"]
+__all__ = ["TRAINING", "SeedFiles", "median_seed", "read_seeds", "reliability_section", "unmet"]
 
 _COLUMNS = {
     "part": ("part", "{}"),
@@ -25,6 +25,8 @@ _COLUMNS = {
     "target": ("target", "{}"),
     "met": ("met by", "{}"),
 }
+TRAINING = "python train.py --task go1_mute --seed SEED --agent.save-interval 10"
+"""How each seed is trained: checkpoints often enough to tell when it walks for the first time."""
 _WALKS = Target(at_most=3.0)
 """Steps within which a training must walk, millions."""
 
@@ -58,7 +60,8 @@ def read_seeds(folder: Path) -> dict[int, SeedFiles]:
     In the order of the seeds.
 
     Raises:
-        MuteError: If a file is not what the command wrote, or of a training with another seed.
+        MuteError: If a file is not what the command wrote, or of a training with another seed, or
+            of an exam with other figures or robots than the first seed's.
     """
     found = ((re.fullmatch(r"seed(\d+)\.json", path.name), path) for path in folder.glob("*.json"))
     paths = {int(match[1]): path for match, path in found if match}
@@ -67,7 +70,30 @@ def read_seeds(folder: Path) -> dict[int, SeedFiles]:
         trained = each.reliability.get("trained_seed", seed)  # the first files do not tell
         if trained != seed:
             raise MuteError(f"{paths[seed]} is of a policy that was trained with seed {trained}")
+    _check_alike(paths, files)
     return files
+
+
+def _check_alike(paths: Mapping[int, Path], files: Mapping[int, SeedFiles]) -> None:
+    """Refuse exams that differ: who was asked more would meet more, and stand higher.
+
+    Raises:
+        MuteError: If a figure is not in every seed's files, or robots differ in number.
+    """
+    names = {seed: {(f["part"], f["name"]) for f in run.figures} for seed, run in files.items()}
+    asked = set().union(*names.values())
+    for seed in files:
+        missing = sorted(asked - names[seed])
+        if missing:
+            part, name = missing[0]
+            raise MuteError(
+                f"{paths[seed]}, or what lies beside it, lacks '{name}' ({part}), which other "
+                "seeds have; measure it anew"
+            )
+    robots = sorted({run.reliability["robots"] for run in files.values()})
+    if len(robots) > 1:
+        folder = next(iter(paths.values())).parent
+        raise MuteError(f"{folder} has exams of {robots} robots; they must be of as many")
 
 
 def median_seed(seeds: Mapping[int, SeedFiles]) -> int:
@@ -91,24 +117,22 @@ def reliability_section(seeds: Mapping[int, SeedFiles]) -> str:
     """Return the section: mean, smallest and largest of every figure, and who meets its target.
 
     Args:
-        seeds: Files of one seed or more.
+        seeds: Files of one seed or more, as `read_seeds` returns them.
     """
     runs = list(seeds.values())
-    robots = {run.reliability["robots"] for run in runs}
+    robots = runs[0].reliability["robots"]
     names = ", ".join(map(str, seeds))
-    figures = dict.fromkeys(
-        (figure["part"], figure["name"]) for run in runs for figure in run.figures
-    )
-    rows = [_row([_figure(run, *name) for run in runs]) for name in figures]
+    by_name = [{(f["part"], f["name"]): f for f in run.figures} for run in runs]
+    rows = [_row([figures[name] for figures in by_name]) for name in by_name[0]]
     return (
         "## Whether one can rely on it\n\n"
         f"{markdown(rows, _COLUMNS)}\n\n"
-        f"Over the seeds {names}, each `python train.py --task go1_mute --seed SEED "
-        "--agent.save-interval 10`, then `python evaluate.py reliability` with "
-        f"{' or '.join(map(str, sorted(robots)))} robots, and `python evaluate.py progress "
+        f"Over the seeds {names}, each `{TRAINING}`, then `python evaluate.py reliability` with "
+        f"{robots} robots, and `python evaluate.py progress "
         "--randomized` (`docs/reliability/`). Unlike elsewhere on this page, robots here have "
         "randomised physics and noisy sensors, unless the figure says else. What one seed never "
-        "reached has no mean: never. What each figure is, is in "
+        "reached has no mean: never. Where a figure could not be had of a seed, as one at a speed "
+        "that it does not reach, the mean is of the others. What each figure is, is in "
         f"[commands.md](commands.md). Of {len(rows)} targets they meet "
         f"{_listed(runs)}; in the middle, by that and then by how much slower beta 1 lands at "
         f"0.5 m/s, is seed {median_seed(seeds)}."
@@ -162,7 +186,8 @@ def _read_beside(
     if not (isinstance(content, dict) and keys <= content.keys()):
         raise MuteError(f"{beside} is nothing that `evaluate.py {command}` wrote")
     for name in _SAME:
-        if reliability.get(name) != content.get(name, reliability.get(name)):
+        known = name in reliability and name in content
+        if known and reliability[name] != content[name]:
             raise MuteError(f"{beside} is not of the training of {path}: {name} differs")
     return content
 
@@ -185,11 +210,11 @@ def _walking(run: SeedFiles) -> Mapping[str, Any] | None:
     return Figure("walks", f"million steps until it walks{exact}", steps, "", _WALKS).as_dict()
 
 
-def _row(figures: Sequence[Mapping[str, Any] | None]) -> dict[str, Any]:
-    """Return a figure over the seeds, of which one at least has it."""
-    measured = [figure for figure in figures if figure is not None]
-    first = measured[0]
-    values = [figure["value"] for figure in measured if not _missing(figure["value"])]
+def _row(figures: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return a figure over the seeds."""
+    first = figures[0]
+    values = [figure["value"] for figure in figures if not _missing(figure["value"])]
+    without = f", {len(figures) - len(values)} without" if 0 < len(values) < len(figures) else ""
     mean = sum(values) / len(values) if values else None
     ends = {
         "mean": mean,
@@ -201,7 +226,7 @@ def _row(figures: Sequence[Mapping[str, Any] | None]) -> dict[str, Any]:
         "name": first["name"],
         **{name: _told(value, first["unit"]) for name, value in ends.items()},
         "target": first["target"],
-        "met": f"{sum(figure['met'] for figure in measured)} of {len(figures)}",
+        "met": f"{sum(figure['met'] for figure in figures)} of {len(figures)}{without}",
     }
 
 

@@ -33,12 +33,14 @@ def cut_short(stopped: str | None) -> str:
 
 
 def mean_and_spread(values: Sequence[float], form: str) -> str:
-    """Return the mean of several values and their sample standard deviation.
+    """Return the mean of values and, of several, their sample standard deviation.
 
     Args:
-        values: Two or more.
+        values: One or more.
         form: Of each of the two figures, as `{:.2f}`.
     """
+    if len(values) == 1:
+        return form.format(values[0])
     return f"{form.format(statistics.mean(values))} ± {form.format(statistics.stdev(values))}"
 
 

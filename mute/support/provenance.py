@@ -54,5 +54,6 @@ def machine_kind() -> str:
         lines = cpu_info.read_text().splitlines()
         names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
         processor = names[0] if names else processor
-    kind = f"{processor}, {usable_cores()} cores"
+    cores = usable_cores()
+    kind = f"{processor}, {cores} core{'s' * (cores > 1)}"
     return f"{kind}, {torch.cuda.get_device_name()}" if torch.cuda.is_available() else kind

@@ -27,6 +27,14 @@ def test_each_lever_takes_away_what_the_recipe_has(lever):
         assert fields[path] != taken, path
 
 
+def test_a_recipe_with_rare_stops_has_fewer_of_them_and_holds_commands_longer():
+    commands = make_task(DEFAULT_TASK).env.commands
+    words = LEVERS["rare_stops"].split()
+    told = {option: float(value) for option, value in zip(words[::2], words[1::2], strict=True)}
+    assert told["--env.commands.standing-fraction"] < commands.standing_fraction
+    assert told["--env.commands.resampling-time"] > commands.resampling_time
+
+
 def _content(met: int, starts: float | None) -> dict[str, Any]:
     names = list(levers._FIGURES.values())
     figures = [{"name": name, "value": 0.5, "met": index < met} for index, name in enumerate(names)]
@@ -57,6 +65,11 @@ def programs(monkeypatch) -> _Programs:
     return programs
 
 
+def _recipe() -> str:
+    """Return the recipe's name in the names of runs."""
+    return levers._conditions("recipe", levers.LeversArgs())["recipe"]
+
+
 def _main(directory: Path, *words: str) -> int:
     places = ["--log-dir", str(directory / "runs"), "--out", str(directory / "found")]
     return levers.main([*places, "--iterations", "30", *words])
@@ -81,10 +94,12 @@ def test_each_is_trained_and_judged_once(programs, tmp_path, capsys):
 
 
 def test_a_training_that_was_stopped_goes_on_from_its_last_checkpoint(programs, tmp_path):
-    run = tmp_path / "runs" / DEFAULT_TASK / "recipe.0.30"
+    run = tmp_path / "runs" / DEFAULT_TASK / f"recipe.0.30.{_recipe()}"
     run.mkdir(parents=True)
-    for iteration in (0, 9, 10):
-        (run / f"model_{iteration}.pt").touch()
+    with pytest.raises(MuteError, match=r"recipe\.0\.30\..* before its first checkpoint"):
+        _main(tmp_path, "--levers", "recipe", "--seeds", "0")
+    for name in ("model_0", "model_9", "model_10", "model_best"):
+        (run / f"{name}.pt").touch()
     assert _main(tmp_path, "--levers", "recipe", "--seeds", "0") == 0
     training = programs.commands[0]
     assert training[training.index("--resume") + 1] == str(run / "model_10.pt")
@@ -110,8 +125,26 @@ def test_the_table_gives_mean_and_ends_and_says_what_is_not_there(tmp_path):
 def test_what_was_found_under_other_conditions_is_not_taken_for_this(programs, tmp_path):
     words = ("--levers", "recipe", "--seeds", "0")
     assert _main(tmp_path, *words) == 0
-    with pytest.raises(MuteError, match=r"recipe\.0\.json has robots 64, not 8"):
-        _main(tmp_path, *words, "--robots", "8")
+    trained = len(programs.commands)
+    for asked in ((), ("--table",)):
+        with pytest.raises(MuteError, match=r"recipe\.0\.json has robots 64, not 8"):
+            _main(tmp_path, "--levers", "no_pushes", *words[1:], "--robots", "8", *asked)
+    assert len(programs.commands) == trained  # nothing was trained before it was refused
+
+
+def test_files_of_another_recipe_are_not_taken_for_this_one(programs, tmp_path, monkeypatch):
+    words = ("--levers", "recipe", "--seeds", "0")
+    assert _main(tmp_path, *words) == 0
+    changed = make_task(DEFAULT_TASK)
+    changed.agent.init_std = 0.7
+    monkeypatch.setattr(levers, "make_task", lambda name: changed)
+    with pytest.raises(MuteError, match=r"recipe\.0\.json has recipe "):
+        _main(tmp_path, *words)
+
+
+def test_a_table_of_nothing_says_so(tmp_path):
+    with pytest.raises(MuteError, match="nothing of these levers"):
+        _main(tmp_path, "--table")
 
 
 def test_a_file_that_lacks_a_figure_is_named(tmp_path):
@@ -120,10 +153,12 @@ def test_a_file_that_lacks_a_figure_is_named(tmp_path):
         table(tmp_path, ["recipe"], [0])
 
 
-@pytest.mark.parametrize("file", sorted((REPOSITORY / "docs" / "reliability").glob("seed?.json")))
-def test_the_figures_of_the_table_are_figures_of_the_exam(file):
-    names = {figure["name"] for figure in json.loads(file.read_text())["figures"]}
-    assert set(levers._FIGURES.values()) <= names
+def test_the_figures_of_the_table_are_figures_of_the_exam():
+    files = sorted((REPOSITORY / "docs" / "reliability").glob("seed?.json"))
+    assert files
+    for file in files:
+        names = {figure["name"] for figure in json.loads(file.read_text())["figures"]}
+        assert set(levers._FIGURES.values()) <= names
 
 
 @pytest.mark.parametrize(

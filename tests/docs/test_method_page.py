@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 
 import pytest
+import torch
 from places import REPOSITORY
 
+from mute.envs.commands import CommandSampler
 from mute.envs.rewards import paper_terms
 from mute.tasks import make_task
 
@@ -37,9 +39,61 @@ def test_the_table_has_every_weight_in_which_the_task_differs_from_the_paper():
 
 
 def test_a_term_that_the_page_scales_by_beta_is_in_the_phase_group():
-    quiet = [name for name, term in _CFG.env.rewards.terms.items() if term.group == "phase"]
-    assert sorted(quiet) == sorted(list(_weights_told())[:4])
-    assert "The first four are phase terms" in _PAGE
+    quiet = {name for name, term in _CFG.env.rewards.terms.items() if term.group == "phase"}
+    sentence = _PAGE[: _PAGE.index(" are phase terms, scaled by beta")].split(" | ")[-1]
+    assert set(re.findall("`([a-z_]+)`", sentence)) == quiet
+
+
+def test_the_page_tells_the_parameters_of_the_terms_that_follow():
+    terms = _CFG.env.rewards.terms
+    forward, turn = terms["lin_vel_following"].params, terms["ang_vel_following"].params
+    assert f"{forward['width']:g} m/s and {turn['width']:g} rad/s wide" in _PAGE
+    assert f"shares of {forward['share']:g} and {turn['share']:g}" in _PAGE
+    acceleration = f"{_CFG.env.rewards.following_acceleration:g}"
+    assert f"with {acceleration} m/s² and {acceleration} rad/s²" in _PAGE
+    assert f"a time constant of {_CFG.env.rewards.following_time:g} s" in _PAGE
+
+
+def test_the_page_tells_the_parameters_of_the_terms_that_step():
+    terms = _CFG.env.rewards.terms
+    lifted = 100.0 * terms["stepping"].params["target"]
+    assert terms["soft_steps"].params["target"] == terms["stepping"].params["target"]
+    assert f"by how much of {lifted:g} cm it was lifted" in _PAGE
+    assert f"exp(-(landing speed / {terms['soft_steps'].params['speed']:g} m/s)²)" in _PAGE
+    assert f"faster than {terms['stamping'].params['above']:g} m/s" in _PAGE
+    clearance = 100.0 * terms["foot_clearance"].params["target"]
+    apex = 100.0 * terms["touchdown_apex"].params["target"]
+    assert f"`foot_clearance` ({clearance:g} cm), `touchdown_apex` ({apex:g} cm)" in _PAGE
+
+
+def test_the_page_tells_how_commands_are_drawn_and_robots_pushed():
+    commands, robots = _CFG.env.commands, _CFG.env.randomization
+    assert f"{100 * commands.slow_fraction:g} % of them are slow" in _PAGE
+    assert f"{100 * commands.single_axis_fraction:g} % go along one axis" in _PAGE
+    assert f"a new one comes every {commands.resampling_time:g} s" in _PAGE
+    assert f"less than {commands.deadband:g} m/s is none" in _PAGE
+    assert f"{100 * commands.standing_fraction:g} % are to stand" in _PAGE
+    assert commands.beta_end_fraction == 0.4 and "Two fifths of the betas are 0 or 1" in _PAGE
+    pushed = f"Every {robots.push_interval:g} s, with a new command, robots are pushed by up to "
+    assert f"{pushed}{robots.push_velocity:g} m/s" in _PAGE
+    assert robots.push_interval % commands.resampling_time == 0.0
+
+
+@pytest.mark.parametrize(
+    ("progress", "words", "share"), [(1.0, "a fifth", 0.2), (0.0, "three tenths", 0.3)]
+)
+def test_as_many_commands_are_to_stand_as_the_page_tells(progress, words, share):
+    sampler = CommandSampler(
+        _CFG.env.commands, 100_000, torch.Generator().manual_seed(0), torch.device("cpu")
+    )
+    sampler.resample(torch.ones(100_000, dtype=torch.bool), True, progress)
+    assert words in _PAGE
+    assert float(sampler.standing.float().mean()) == pytest.approx(share, abs=0.03)
+
+
+def test_the_page_tells_when_learning_comes_to_rest():
+    share = 100.0 * _CFG.agent.settling_share
+    assert f"Over the last {share:g} % of the iterations the learning rates" in _PAGE
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,23 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 from typing import Any
+
+from mute.config import TaskCfg
+from mute.config_versions import earlier_terms
+
+
+def with_terms_of_then(cfg: TaskCfg) -> TaskCfg:
+    """Return a task with such terms alone as there were while weights were fields."""
+    weights = {name: term.weight for name, term in cfg.env.rewards.terms.items()}
+    terms = {
+        name: dataclasses.replace(term, weight=weights[name])
+        for name, term in earlier_terms().items()
+        if name in weights
+    }
+    rewards = dataclasses.replace(cfg.env.rewards, terms=terms)
+    return dataclasses.replace(cfg, env=dataclasses.replace(cfg.env, rewards=rewards))
 
 
 def flat_rewards(plain: dict[str, Any], **changed: float) -> dict[str, Any]:

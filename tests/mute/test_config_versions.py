@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import copy
-import dataclasses
 import math
 import re
 
 import pytest
-from earlier_versions import estimators_own_heights, flat_rewards
+from earlier_versions import estimators_own_heights, flat_rewards, with_terms_of_then
 from places import REPOSITORY
 
 from mute.checkpoint import load_checkpoint
@@ -19,20 +18,8 @@ from mute.envs.rewards import RewardsCfg, paper_terms, reward_term
 from mute.tasks import make_task, task_names
 
 
-def _task_of_then() -> TaskCfg:
-    """Return `go1_mute` with such terms alone as there were while weights were fields."""
-    cfg = make_task("go1_mute")
-    weights = {name: term.weight for name, term in cfg.env.rewards.terms.items()}
-    cfg.env.rewards.terms = {
-        name: dataclasses.replace(term, weight=weights[name])
-        for name, term in earlier_terms().items()
-        if name in weights
-    }
-    return cfg
-
-
 def _with_flat_rewards(**changed: float) -> dict:
-    return flat_rewards(to_plain(_task_of_then()), **changed)
+    return flat_rewards(to_plain(with_terms_of_then(make_task("go1_mute"))), **changed)
 
 
 def _with_old_heights(offset: float, scale: float) -> dict:
@@ -58,7 +45,7 @@ def test_an_engine_that_is_gone_becomes_the_one_that_took_its_place():
 
 
 def test_weights_that_were_fields_become_the_terms_that_they_weighed():
-    assert from_plain(_with_flat_rewards()) == _task_of_then()
+    assert from_plain(_with_flat_rewards()) == with_terms_of_then(make_task("go1_mute"))
 
 
 def test_a_constant_of_all_rewards_becomes_a_parameter_of_its_term():

@@ -10,7 +10,7 @@ import pytest
 from places import REPOSITORY
 
 from mute.command_lines import card
-from mute.command_lines.card_reliability import median_seed
+from mute.command_lines.card_reliability import SeedFiles, median_seed
 from mute.command_lines.card_results import results_page, summary
 from mute.command_lines.card_tables import markdown, mean_and_spread
 from mute.support.errors import MuteError
@@ -40,13 +40,27 @@ def test_without_a_directory_both_pages_are_printed(capsys):
 
 
 def test_a_spread_is_that_of_the_trainings(files):
-    speeds = [run["at_speed"][0]["landing_speed_mean"] for run in files.gaits.values()]
-    assert len(speeds) == 5
-    assert f" {mean_and_spread(speeds, '{:.2f}')} |" in summary(files)
+    gaits = {}
+    for seed, (error, landing) in {0: (0.01, 0.5), 1: (0.02, 0.6), 2: (0.06, 0.7)}.items():
+        gait = files.card["figures"]
+        first, *others = gait["range"]
+        slow, *rest = gait["at_speed"]
+        gaits[seed] = gait | {
+            "range": [first | {"velocity_error_sq": error, "fall_rate": 0.0}, *others],
+            "at_speed": [slow | {"landing_speed_mean": landing, "apex_mean": 0.05}, *rest],
+        }
+    seeds = {seed: SeedFiles({}, gait=gait) for seed, gait in gaits.items()}
+    [row] = re.findall(
+        r"^\| 0 \|.*$", summary(dataclasses.replace(files, seeds=seeds)), re.MULTILINE
+    )
+    robots = 3 * files.card["figures"]["trials"]
+    told = f"| 0 | 0 of {robots} | 0.030 ± 0.026 | 0.60 ± 0.10 | 5.0 ± 0.0 |"
+    assert row.startswith(told)
 
 
 def test_a_mean_has_the_sample_standard_deviation_beside_it():
     assert mean_and_spread([1.0, 2.0, 3.0], "{:.2f}") == "2.00 ± 1.00"
+    assert mean_and_spread([1.5], "{:.2f}") == "1.50"
 
 
 def test_a_robot_that_fell_in_one_training_is_counted(files):
@@ -76,8 +90,11 @@ def test_what_the_level_loses_with_beta_is_compared_at_equal_actual_speed(files)
         for command in (0.4, 0.7, 1.0)
     ]
     page = results_page(dataclasses.replace(files, sweep_speed=sweep))
-    assert "by 3 dB at the same actual speed" in page
+    assert "by 3 dB at the same actual speed, 0.4 to 0.8 m/s" in page
     assert "by 4 to 5 dB at the same command" in page
+    slow = [row | {"speed_mean": 0.9 * row["speed_mean"]} for row in sweep]
+    page = results_page(dataclasses.replace(files, sweep_speed=slow))
+    assert "at the same actual speed, 0.4 to 0.7 m/s" in page  # beta 1 gets to 0.72
 
 
 def test_markdown_formats_each_column_and_leaves_a_dash_for_what_is_missing():

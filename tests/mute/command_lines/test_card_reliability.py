@@ -46,14 +46,35 @@ def test_a_figure_has_its_mean_its_ends_and_who_meets_its_target(tmp_path):
     ]
 
 
-def test_what_a_seed_lacks_is_in_no_mean_and_meets_nothing(tmp_path):
-    _write(tmp_path, 0, _level(float("nan")))
-    _write(tmp_path, 1, _falls(0.0), _level(55.0))
-    _write(tmp_path, 2)
+def test_what_could_not_be_had_of_a_seed_is_in_no_mean_and_meets_nothing(tmp_path):
+    for seed, level in enumerate((float("nan"), 55.0, float("nan"))):
+        _write(tmp_path, seed, _level(level))
     assert _rows(tmp_path) == [
-        "| stands | level at the trunk | 55 dBA | 55 dBA | 55 dBA | <= 56 dBA | 1 of 3 |",
-        "| falls | robots that fall | 0.0 % | 0.0 % | 0.0 % | < 1.0 % | 1 of 3 |",
+        "| stands | level at the trunk | 55 dBA | 55 dBA | 55 dBA | <= 56 dBA | "
+        "1 of 3, 2 without |",
     ]
+    missed = unmet(read_seeds(tmp_path))
+    assert missed.startswith("level at the trunk <= 56 dBA (stands): seed 0: ")
+    assert "seed 2" in missed and "seed 1" not in missed
+
+
+def test_seeds_that_were_asked_other_things_are_refused(tmp_path):
+    _write(tmp_path, 0, _falls(0.0), _level(55.0))
+    _write(tmp_path, 1, _falls(0.0))
+    with pytest.raises(MuteError, match=r"seed1\.json, .* lacks 'level at the trunk' \(stands\)"):
+        read_seeds(tmp_path)
+    _write(tmp_path, 1, _falls(0.0), _level(55.0))
+    write_json(tmp_path / "seed0_progress.json", {"randomized": True, "checkpoints": []})
+    with pytest.raises(MuteError, match=r"seed1\.json, .* lacks 'million steps until it walks'"):
+        read_seeds(tmp_path)
+
+
+def test_seeds_that_were_asked_with_other_robots_are_refused(tmp_path):
+    for seed, robots in enumerate((64, 8)):
+        content = {"robots": robots, "figures": [_falls(0.0).as_dict()]}
+        write_json(tmp_path / f"seed{seed}.json", content)
+    with pytest.raises(MuteError, match=r"exams of \[8, 64\] robots"):
+        read_seeds(tmp_path)
 
 
 def test_the_steps_until_a_training_walks_are_read_from_its_progress(tmp_path):
@@ -106,6 +127,10 @@ def test_a_file_of_another_training_beside_is_refused(tmp_path):
     write_json(tmp_path / "seed0_gait.json", gait)
     with pytest.raises(MuteError, match=r"seed0_gait\.json .*policy_sha256"):
         read_seeds(tmp_path)
+    # Files of earlier versions do not tell; what only one tells is no difference.
+    del content["policy_sha256"]
+    write_json(tmp_path / "seed0.json", content)
+    assert read_seeds(tmp_path)[0].gait == gait
 
 
 def test_a_file_of_a_training_with_another_seed_than_its_name_is_refused(tmp_path):
@@ -135,8 +160,24 @@ def test_a_file_of_another_command_is_refused_by_name(tmp_path):
 
 def test_a_page_without_the_training_that_ships_is_refused(tmp_path):
     seed = read_json(RESOURCES / "go1" / "go1_mute.json")["seed"]
+    with pytest.raises(MuteError, match=rf"no seed{seed}\.json, of what ships"):
+        card.main(["--reliability", str(tmp_path)])
     _write(tmp_path, seed, _falls(0.0))  # but no gait
-    with pytest.raises(MuteError, match=rf"no seed{seed}\.json and seed{seed}_gait\.json"):
+    with pytest.raises(MuteError, match=rf"no file at .*seed{seed}_gait\.json"):
+        card.main(["--reliability", str(tmp_path)])
+
+
+@pytest.mark.parametrize(
+    ("changed", "named"),
+    [({"iteration": 3}, "is of iteration 3, what ships of"), ({"range": []}, r"has betas \[\]")],
+)
+def test_a_training_that_is_not_as_what_ships_is_refused(changed, named, tmp_path):
+    shipped = read_json(RESOURCES / "go1" / "go1_mute.json")
+    for seed in (shipped["seed"], shipped["seed"] + 1):
+        _write(tmp_path, seed, _falls(0.0))
+        write_json(tmp_path / f"seed{seed}_gait.json", shipped["figures"])
+    write_json(tmp_path / f"seed{seed}_gait.json", shipped["figures"] | changed)
+    with pytest.raises(MuteError, match=rf"seed{seed}_gait\.json {named}"):
         card.main(["--reliability", str(tmp_path)])
 
 

@@ -282,6 +282,14 @@ def test_several_robots_begin_at_rest_each_a_little_different(policy, monkeypatc
     assert not torch.equal(joints[0], joints[1])
 
 
+def test_a_robot_that_begins_moving_has_its_command_at_once(policy, monkeypatch):
+    first, *commands = _first_frames(policy, monkeypatch, "--vx", "0.4", "--begin", "moving")
+    joints, velocities = first[:, :12], first[:, 12:]
+    assert float(joints.abs().max()) > 0.01
+    assert float(velocities.abs().max()) > 0.01
+    assert [round(float(command[0, 0]), 6) for command in commands] == [0.4] * 50
+
+
 def _told(command: Command, seconds: float, num_envs: int = 1) -> tuple[str, float | None]:
     """Return what is said of robots that hold the stance, in text and as a number."""
     cfg = evaluation_cfg(QuadrupedEnvCfg(num_threads=1), num_envs, seconds=10.0, seed=0)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import torch
 import yaml
-from earlier_versions import estimators_own_heights, flat_rewards
+from earlier_versions import estimators_own_heights, flat_rewards, with_terms_of_then
 from finished_run import (
     THREE_ITERATIONS,
     contents,
@@ -240,8 +240,8 @@ def test_damaged_parameters_are_blamed_in_one_line_and_nothing_is_lost(
 
 def test_a_run_of_an_earlier_version_goes_on_with_its_rewards(finished, tmp_path):
     saved = load_checkpoint(finished / "model_2.pt")
-    expected = from_plain(saved["config"])
-    saved["config"] = flat_rewards(estimators_own_heights(saved["config"], 0.3, 0.1))
+    expected = with_terms_of_then(from_plain(saved["config"]))
+    saved["config"] = flat_rewards(estimators_own_heights(to_plain(expected), 0.3, 0.1))
     old = tmp_path / "go1_mute" / "old" / "model_2.pt"
     save_checkpoint(old, saved)
     assert train._configuration(train._arguments(["--resume", str(old)])[0]) == expected
