@@ -13,6 +13,7 @@ from places import SHIPPED_POLICY
 
 from mute.acoustics.origin import sound_origin
 from mute.command_lines import evaluate
+from mute.controllers import load_policy
 from mute.evaluation.course.course import Course, FloorArea
 from mute.support.errors import MuteError
 
@@ -45,7 +46,7 @@ def test_the_command_writes_figures_track_map_and_sound(tmp_path, capsys):
     content = json.loads((out / "walk.json").read_text())
     assert content["end"] == "arrived"
     assert content["beta"] == 0.0
-    assert content["iteration"] == 400
+    assert content["iteration"] == load_policy(POLICY).iteration
     assert content.items() >= sound_origin(POLICY).items()
     assert content["mnl"] < content["pnl"]
     with (out / "track.csv").open(newline="") as file:
