@@ -45,13 +45,24 @@ class SeedFiles:
     @property
     def targets_met(self) -> int:
         """How many targets it meets."""
-        return sum(figure["met"] for figure in self.figures)
+        return sum(figure["met"] for figure in self.figures.values())
 
     @property
-    def figures(self) -> list[Mapping[str, Any]]:
-        """All its figures with a target, how soon it walks among them where that is known."""
-        walking = _walking(self)
-        return [*self.reliability["figures"], *([] if walking is None else [walking])]
+    def first_walk(self) -> Mapping[str, Any] | None:
+        """What `evaluate.py progress` wrote of the first checkpoint that walks, None of none."""
+        checkpoints = [] if self.progress is None else self.progress["checkpoints"]
+        return next((row for row in checkpoints if row["walks"]), None)
+
+    @property
+    def figures(self) -> dict[tuple[str, str], Mapping[str, Any]]:
+        """All its figures with a target, by part and name.
+
+        How soon it walks is among them where that is known.
+        """
+        figures = list(self.reliability["figures"])
+        if self.progress is not None:
+            figures.append(_walking(self.progress, self.first_walk))
+        return {(figure["part"], figure["name"]): figure for figure in figures}
 
 
 def read_seeds(folder: Path) -> dict[int, SeedFiles]:
@@ -80,10 +91,9 @@ def _check_alike(paths: Mapping[int, Path], files: Mapping[int, SeedFiles]) -> N
     Raises:
         MuteError: If a figure is not in every seed's files, or robots differ in number.
     """
-    names = {seed: {(f["part"], f["name"]) for f in run.figures} for seed, run in files.items()}
-    asked = set().union(*names.values())
-    for seed in files:
-        missing = sorted(asked - names[seed])
+    asked = set().union(*(run.figures for run in files.values()))
+    for seed, run in files.items():
+        missing = sorted(asked - run.figures.keys())
         if missing:
             part, name = missing[0]
             raise MuteError(
@@ -109,7 +119,7 @@ def median_seed(seeds: Mapping[int, SeedFiles]) -> int:
 
 
 def _slower(run: SeedFiles) -> float:
-    figure = _figure(run, "beta", "landings slower at beta 1, at 0.5 m/s")
+    figure = run.figures.get(("beta", "landings slower at beta 1, at 0.5 m/s"))
     return -math.inf if figure is None or _missing(figure["value"]) else figure["value"]
 
 
@@ -122,8 +132,8 @@ def reliability_section(seeds: Mapping[int, SeedFiles]) -> str:
     runs = list(seeds.values())
     robots = runs[0].reliability["robots"]
     names = ", ".join(map(str, seeds))
-    by_name = [{(f["part"], f["name"]): f for f in run.figures} for run in runs]
-    rows = [_row([figures[name] for figures in by_name]) for name in by_name[0]]
+    figures = [run.figures for run in runs]
+    rows = [_row([each[name] for each in figures]) for name in figures[0]]
     return (
         "## Whether one can rely on it\n\n"
         f"{markdown(rows, _COLUMNS)}\n\n"
@@ -143,7 +153,7 @@ def unmet(seeds: Mapping[int, SeedFiles]) -> str:
     """Return in words which targets are not met, and by which seeds; an empty text if all are."""
     missed: dict[str, list[str]] = {}
     for seed, run in seeds.items():
-        for figure in run.figures:
+        for figure in run.figures.values():
             if not figure["met"]:
                 told = f"{figure['name']} {figure['target']} ({figure['part']})"
                 value = _told(figure["value"], figure["unit"])
@@ -192,21 +202,10 @@ def _read_beside(
     return content
 
 
-def _figure(run: SeedFiles, part: str, name: str) -> Mapping[str, Any] | None:
-    """Return a figure of a run; None where it was not measured."""
-    return next((f for f in run.figures if (f["part"], f["name"]) == (part, name)), None)
-
-
-def _walking(run: SeedFiles) -> Mapping[str, Any] | None:
-    """Return after how many steps a training walked, infinitely many if it never did.
-
-    None where that is not known.
-    """
-    if run.progress is None:
-        return None
-    first = next((row for row in run.progress["checkpoints"] if row["walks"]), None)
+def _walking(progress: Mapping[str, Any], first: Mapping[str, Any] | None) -> Mapping[str, Any]:
+    """Return after how many steps a training walked, infinitely many if it never did."""
     steps = math.inf if first is None else first["steps"] / 1e6
-    exact = "" if run.progress.get("randomized") else ", the exact robot"
+    exact = "" if progress.get("randomized") else ", the exact robot"
     return Figure("walks", f"million steps until it walks{exact}", steps, "", _WALKS).as_dict()
 
 

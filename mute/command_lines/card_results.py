@@ -5,14 +5,14 @@ A function a section; figures in sentences are computed from the files, like tho
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from mute.command_lines.card_reliability import TRAINING, SeedFiles, reliability_section, unmet
 from mute.command_lines.card_tables import markdown, mean_and_spread, spread_of_trials, times
+from mute.evaluation.matched_speed import level_at_speed
 from mute.evaluation.paper_levels import PAPER_LEVELS, PAPER_MNL_AT_08, PAPER_WALK
 
 __all__ = ["ResultFiles", "results_page", "summary"]
@@ -141,10 +141,11 @@ def summary(files: ResultFiles) -> str:
                 "level": spread_of_trials(levels[beta], "mnl") if beta in levels else None,
             }
         )
+    seeds = ", ".join(map(str, files.gaits))
     fitted, predicted = (PAPER_LEVELS[f"mute beta {beta}"]["wood"][0] for beta in (0, 1))
     return (
         f"{markdown(rows, _SUMMARY)}\n\n"
-        f"Mean ± standard deviation over {len(runs)} trainings, seeds {_names(files.gaits)}, of "
+        f"Mean ± standard deviation over {len(runs)} trainings, seeds {seeds}, of "
         f"{files.card['iterations']} iterations. Landing speed and lift are at an *actual* "
         "0.5 m/s. The level is the policy's that ships, asked for 0.5 m/s, over "
         f"{levels[0.0]['trials']} trials: modelled, fitted to the paper's {fitted:.1f} dBA at beta "
@@ -189,10 +190,6 @@ def _trainings(files: ResultFiles) -> str:
     )
 
 
-def _names(seeds: Iterable[int]) -> str:
-    return ", ".join(map(str, seeds))
-
-
 def _policy(files: ResultFiles) -> str:
     card, figures = files.card, files.card["figures"]
     in_cm = [row | {"apex_cm": times(row["apex_mean"], 100.0)} for row in figures["at_speed"]]
@@ -214,10 +211,10 @@ def _policy(files: ResultFiles) -> str:
 def _first_walk(files: ResultFiles) -> str:
     """Tell when the training that made the policy walked for the first time."""
     seed = files.card["seed"]
-    progress = files.seeds[seed].progress
+    run = files.seeds[seed]
+    progress, first = run.progress, run.first_walk
     if progress is None:
         return "When it walked for the first time was not measured."
-    first = next((row for row in progress["checkpoints"] if row["walks"]), None)
     when = (
         f"for the first time after {first['iteration']} iterations, {first['minutes']:.1f} min"
         if first
@@ -274,9 +271,9 @@ def _paper_task(files: ResultFiles) -> str:
 
 
 def _shortcomings(files: ResultFiles) -> str:
-    sweep = _by_beta(files.sweep_speed)
     quiet = next(row for row in files.noise if row["surface"] == "wood" and row["beta"] == 1.0)
-    same_speed, same_command = _drops_at_speed(sweep), _drops_at_command(sweep)
+    same_speed = _drops_at_speed(files.sweep_speed)
+    same_command = _drops_at_command(files.sweep_speed)
     shares = {row["surface"]: _not_of_impacts(row) for row in files.noise if row["beta"] == 1.0}
     peaks = {beta: _peaks_missing(files.noise, beta) for beta in (0.0, 1.0)}
     loud, hushed = (
@@ -345,33 +342,21 @@ def _ends(rows: Sequence[Mapping[str, Any]], name: str, form: str, factor: float
     return ", ".join(form.format(factor * row[name]) for row in (rows[0], rows[-1]))
 
 
-def _by_beta(
-    sweep: Sequence[Mapping[str, Any]],
-) -> tuple[Sequence[Mapping[str, Any]], Sequence[Mapping[str, Any]]]:
-    """Return the rows of beta 0 and of beta 1, each in the order of their actual speeds."""
-    loud, quiet = (
-        sorted((row for row in sweep if row["beta"] == beta), key=lambda row: row["speed_mean"])
-        for beta in (0.0, 1.0)
-    )
-    return loud, quiet
-
-
-def _drops_at_speed(
-    sweep: tuple[Sequence[Mapping[str, Any]], Sequence[Mapping[str, Any]]],
-) -> dict[float, float]:
+def _drops_at_speed(sweep: Sequence[Mapping[str, Any]]) -> dict[float, float]:
     """Return by how much the mean level falls from beta 0 to 1, dB, by actual speed, m/s.
 
     Between measured speeds; where one beta does not get as slow or as fast there is nothing to
     compare.
     """
-    low = max(rows[0]["speed_mean"] for rows in sweep)
-    high = min(rows[-1]["speed_mean"] for rows in sweep)
-    speeds = [speed for speed in (0.4, 0.5, 0.6, 0.7, 0.8) if low <= speed <= high]
     loud, quiet = (
-        np.interp(speeds, [r["speed_mean"] for r in rows], [r["mnl_mean"] for r in rows])
-        for rows in sweep
+        [(row["speed_mean"], row["mnl_mean"]) for row in sweep if row["beta"] == beta]
+        for beta in (0.0, 1.0)
     )
-    return dict(zip(speeds, (loud - quiet).tolist(), strict=True))
+    drops = {
+        speed: level_at_speed(loud, speed) - level_at_speed(quiet, speed)
+        for speed in (0.4, 0.5, 0.6, 0.7, 0.8)
+    }
+    return {speed: drop for speed, drop in drops.items() if math.isfinite(drop)}
 
 
 def _told_by_speed(drops: Mapping[float, float]) -> str:
@@ -381,11 +366,12 @@ def _told_by_speed(drops: Mapping[float, float]) -> str:
     return f"{_from_to(list(drops.values()))} dB at the same actual speed, {speeds}"
 
 
-def _drops_at_command(
-    sweep: tuple[Sequence[Mapping[str, Any]], Sequence[Mapping[str, Any]]],
-) -> list[float]:
+def _drops_at_command(sweep: Sequence[Mapping[str, Any]]) -> list[float]:
     """Return by how much the mean level falls from beta 0 to 1 at every command, dB."""
-    loud, quiet = ({row["command_speed"]: row["mnl_mean"] for row in rows} for rows in sweep)
+    loud, quiet = (
+        {row["command_speed"]: row["mnl_mean"] for row in sweep if row["beta"] == beta}
+        for beta in (0.0, 1.0)
+    )
     return [level - quiet[command] for command, level in loud.items()]
 
 

@@ -17,7 +17,7 @@ from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.gait import Gait
 from mute.evaluation.trials import run_trial
 
-__all__ = ["figures_at_speed", "sweep_beta_at_speed"]
+__all__ = ["figures_at_speed", "level_at_speed", "sweep_beta_at_speed"]
 
 _COMMAND_FACTORS = (0.8, 1.0, 1.2, 1.4, 1.7, 2.0)
 """Commanded over target speed: a high beta walks slower than it is asked to, so the actual speeds
@@ -79,3 +79,20 @@ def figures_at_speed(gaits: Sequence[Gait], speed: float) -> dict[str, float]:
         name: float(np.interp(speed, speeds, [getattr(gait, name) for gait in ordered]))
         for name in names
     }
+
+
+def level_at_speed(walks: Sequence[tuple[float, float]], speed: float) -> float:
+    """Return the mean noise level at an actual speed, between measured ones, dBA.
+
+    Args:
+        walks: Actual speed, m/s, and level, dBA, of one beta at several commanded speeds.
+        speed: Actual speed, m/s.
+
+    Returns:
+        NaN where no two walks with a level enclose the speed.
+    """
+    known = sorted((walked, level) for walked, level in walks if math.isfinite(level))
+    if not known or not known[0][0] <= speed <= known[-1][0]:
+        return math.nan
+    speeds, levels = zip(*known, strict=True)
+    return float(np.interp(speed, speeds, levels))

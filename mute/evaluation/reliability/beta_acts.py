@@ -7,15 +7,14 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
 import torch
 
 from mute.acoustics.gains import load_gains
 from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
 from mute.evaluation.gait import GaitMeter
-from mute.evaluation.matched_speed import figures_at_speed
-from mute.evaluation.noise_levels import SETTLE_TIME, NoiseRow, NoiseSetting, measure_noise
+from mute.evaluation.matched_speed import figures_at_speed, level_at_speed
+from mute.evaluation.noise_levels import SETTLE_TIME, NoiseSetting, measure_noise
 from mute.evaluation.reliability.conditions import (
     SOUND_WORK,
     OnWork,
@@ -26,7 +25,7 @@ from mute.evaluation.reliability.conditions import (
 )
 from mute.evaluation.reliability.figures import Figure, PartResult, Target
 
-__all__ = ["beta_acts_work", "beta_figures", "level_at_speed", "measure_beta_acts"]
+__all__ = ["beta_acts_work", "beta_figures", "measure_beta_acts"]
 
 BETAS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Quiet factors that are compared, from the loudest to the quietest."""
@@ -98,23 +97,6 @@ def beta_figures(speed: float, rows: Sequence[dict[str, Any]]) -> list[Figure]:
     ]
 
 
-def level_at_speed(rows: Sequence[NoiseRow], speed: float) -> float:
-    """Return the mean noise level at an actual speed, between measured ones, dBA.
-
-    Args:
-        rows: Figures of one beta at several commanded speeds.
-        speed: Actual speed, m/s.
-
-    Returns:
-        NaN where no two rows with a level enclose the speed.
-    """
-    known = sorted((row.speed_mean, row.mnl_mean) for row in rows if math.isfinite(row.mnl_mean))
-    if not known or not known[0][0] <= speed <= known[-1][0]:
-        return math.nan
-    speeds, levels = zip(*known, strict=True)
-    return float(np.interp(speed, speeds, levels))
-
-
 def _each(robots: int) -> int:
     return max(1, robots // 16)
 
@@ -169,7 +151,9 @@ def _levels(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[dict[
         {
             "beta": beta,
             "speed": _HEARD_SPEED,
-            "mnl": level_at_speed([row for row in rows if row.beta == beta], _HEARD_SPEED),
+            "mnl": level_at_speed(
+                [(row.speed_mean, row.mnl_mean) for row in rows if row.beta == beta], _HEARD_SPEED
+            ),
         }
         for beta in ends
     ]

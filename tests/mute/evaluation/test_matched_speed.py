@@ -12,7 +12,7 @@ from standing import Standing
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.evaluation.gait import Gait
-from mute.evaluation.matched_speed import figures_at_speed, sweep_beta_at_speed
+from mute.evaluation.matched_speed import figures_at_speed, level_at_speed, sweep_beta_at_speed
 from mute.evaluation.trials import evaluation_cfg
 
 
@@ -50,3 +50,10 @@ def test_a_robot_that_stands_matches_no_walking_speed():
     rows = sweep_beta_at_speed(_make_env(6), Standing(6), 0.5, [0.25], 60)
     assert rows[0]["beta"] == 0.25
     assert math.isnan(rows[0]["landing_speed_mean"])
+
+
+def test_a_level_is_read_off_between_the_actual_speeds_that_enclose_it():
+    walks = [(0.6, 64.0), (0.4, 60.0), (0.45, math.nan)]
+    assert level_at_speed(walks, 0.5) == pytest.approx(62.0)
+    assert math.isnan(level_at_speed(walks, 0.7))
+    assert math.isnan(level_at_speed([], 0.5))

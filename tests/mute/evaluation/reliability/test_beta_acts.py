@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import pytest
 
-from mute.evaluation.noise_levels import NoiseRow
-from mute.evaluation.reliability.beta_acts import beta_figures, level_at_speed
+from mute.evaluation.reliability.beta_acts import beta_figures
 
 
 def _rows(landing, apex=(0.05,) * 5):
@@ -42,16 +40,3 @@ def test_a_step_of_beta_that_lands_no_slower_and_a_low_foot_are_told():
 def test_of_a_beta_that_does_not_walk_at_the_speed_nothing_is_said():
     figures = beta_figures(0.3, _rows((0.5, 0.45, 0.4, 0.35, math.nan)))
     assert all(math.isnan(figure.value) and not figure.met for figure in figures)
-
-
-def _heard(speed: float, level: float) -> NoiseRow:
-    names = [field.name for field in dataclasses.fields(NoiseRow)]
-    values = dict.fromkeys(names, 0.0) | {"speed_mean": speed, "mnl_mean": level}
-    return NoiseRow(**values)  # pyright: ignore[reportArgumentType]
-
-
-def test_a_level_is_read_off_between_the_actual_speeds_that_enclose_it():
-    rows = [_heard(0.6, 64.0), _heard(0.4, 60.0), _heard(0.45, math.nan)]
-    assert level_at_speed(rows, 0.5) == pytest.approx(62.0)
-    assert math.isnan(level_at_speed(rows, 0.7))
-    assert math.isnan(level_at_speed([], 0.5))
