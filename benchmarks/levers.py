@@ -1,11 +1,11 @@
 """Take the recipe's parts away, one at a time: python -m benchmarks.levers --out docs/levers.
 
-Each part is left out by flags of `train.py`, trained with several seeds, and judged by the targets
-of `evaluate.py reliability`. One luck is not a finding: what counts is the mean over the seeds and
-their spread. Physics steps are 10 ms, half as many as the recipe's, which is good enough to compare
-by. A training that is stopped goes on from its last checkpoint where the command is run again, and
-one that is judged already is not done again: several commands, each with seeds of its own, may
-share the folders.
+Each part is left out, or made stronger, by flags of `train.py`, trained with several seeds, and
+judged by the targets of `evaluate.py reliability`. One luck is not a finding: what counts is the
+mean over the seeds and their spread. Physics steps are 10 ms, half as many as the recipe's, which
+is good enough to compare by. A training that is stopped goes on from its last checkpoint where the
+command is run again, and one that is judged already is not done again: several commands, each with
+seeds of its own, may share the folders.
 """
 
 from __future__ import annotations
@@ -59,8 +59,9 @@ LEVERS: Mapping[str, str] = {
     "no_slow_commands": "--env.commands.slow-fraction 0 --env.commands.single-axis-fraction 0",
     "rare_stops": "--env.commands.standing-fraction 0.05 --env.commands.resampling-time 10",
     "no_pushes": "--env.randomization.push-velocity 0",
+    "harder_pushes": ("--env.randomization.push-velocity 0.7 --env.randomization.push-interval 3"),
 }
-"""What each training does without, as flags of `train.py`."""
+"""What each training does without, or has more of, as flags of `train.py`."""
 
 _PHYSICS = "--env.scene.timestep 0.01 --env.decimation 2"
 

@@ -17,7 +17,7 @@ from mute.tasks import DEFAULT_TASK, make_task
 
 
 @pytest.mark.parametrize("lever", [name for name in LEVERS if name != "recipe"])
-def test_each_lever_takes_away_what_the_recipe_has(lever):
+def test_each_lever_changes_what_the_recipe_has(lever):
     fields = flat_fields(make_task(DEFAULT_TASK))
     words = LEVERS[lever].split()
     while words:
