@@ -25,7 +25,6 @@ from rich.progress import track
 from mute.acoustics.audible_env import make_listening_env
 from mute.acoustics.contacts import ContactBlock
 from mute.acoustics.energy import EnergyMeter
-from mute.acoustics.gains import load_gains
 from mute.acoustics.listener import SAMPLE_RATE
 from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
 from mute.acoustics.recorder import Recorder
@@ -41,7 +40,8 @@ from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
 from mute.evaluation.noise_levels import SETTLE_TIME, NoiseSetting, measure_noise
 from mute.evaluation.tables import print_table, write_json
-from mute.evaluation.trials import evaluation_cfg, run_trial
+from mute.evaluation.trials import run_trial
+from mute.evaluation.usual_robots import robots_cfg
 from mute.support.errors import run_cli
 from mute.support.processes import call_apart, peak_memory_mb
 from mute.support.provenance import machine_kind
@@ -111,25 +111,25 @@ def measure(policy_file: str, trials: int, seconds: float, whole_alone: bool) ->
         seconds: Measured length of a trial, s.
         whole_alone: Leave out the parts of the whole.
     """
-    policy, gains = load_audible_policy(Path(policy_file)), load_gains()
+    policy = load_audible_policy(Path(policy_file))
     simulated = seconds + SETTLE_TIME
 
     def part(name: str, robots: int, wall: float) -> Part:
         return Part(name, robots, simulated, wall, simulated / wall)
 
     start = time.perf_counter()
-    measure_noise(policy, _FLOOR, [NoiseSetting(0.0, _SPEED)], trials, seconds, _SEED, gains)
+    measure_noise(policy, _FLOOR, [NoiseSetting(0.0, _SPEED)], trials, seconds, _SEED)
     parts = [part("whole", trials, time.perf_counter() - start)]
     memory = peak_memory_mb()
     if whole_alone:
         return Times(parts, memory)
-    soundscape = Soundscape(trials, [_FLOOR], sample_rate=SAMPLE_RATE, seed=_SEED, gains=gains)
+    soundscape = Soundscape(trials, [_FLOOR], sample_rate=SAMPLE_RATE, seed=_SEED)
     meter = SoundLevelMeter(SAMPLE_RATE, trials)
     finding, hearing, _ = _walk(
         policy, trials, simulated, lambda block: meter.update(soundscape.render(block))
     )
     parts += [part("recorder", trials, finding), part("sound", trials, hearing)]
-    energies = EnergyMeter(1, [_FLOOR], gains=gains)
+    energies = EnergyMeter(1, [_FLOOR])
     finding, hearing, walking = _walk(policy, 1, simulated, energies.update)
     parts += [part("lone recorder", 1, finding), part("lone energies", 1, hearing)]
     parts.append(part("lone walk", 1, walking))
@@ -180,7 +180,7 @@ def _walk(
     policy: Policy, robots: int, simulated: float, hear: Callable[[ContactBlock], object]
 ) -> tuple[float, float, float]:
     """Walk, and return the times of the recorder, of `hear`, and of everything, s."""
-    env = make_listening_env(evaluation_cfg(policy.cfg.env, robots, simulated, _SEED), _FLOOR)
+    env = make_listening_env(robots_cfg(policy, robots, simulated, _SEED), _FLOOR)
     recorder = Recorder(env)
     steps, at_once = round(simulated / env.step_dt), round(_STRETCH / env.step_dt)
     made, finding, hearing = 0, 0.0, 0.0

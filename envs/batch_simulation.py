@@ -118,6 +118,13 @@ class BatchSimulation:
             self._fields[name] = torch.from_numpy(self._batch.expand(name))
         return self._fields[name]
 
+    def read_field(self, name: str) -> torch.Tensor:
+        """Return a model field of every simulation, to be read. Shape: (num_envs, ...)."""
+        if name in self._fields:
+            return self._fields[name]
+        value = torch.from_numpy(getattr(self.model, name).copy()).to(self.device)
+        return value.expand(self.num_envs, *value.shape)
+
     def set_const(self) -> None:
         """Recompute the constants that depend on model fields, after writing these."""
         self._batch.set_const()

@@ -1,6 +1,6 @@
 """Physics that differs from robot to robot, and pushes while it walks.
 
-Each simulation draws its own friction, masses and gains once, when it is made: a thousand robots
+Each simulation draws its own grip, masses and gains once, when it is made: a thousand robots
 stay a thousand robots for a whole training.
 """
 
@@ -26,8 +26,8 @@ class RandomizationCfg:
 
     enabled: bool = True
     """Whether anything is randomised."""
-    friction: tuple[float, float] = (0.4, 1.25)
-    """Sliding friction coefficient between feet and floor."""
+    friction_factor: tuple[float, float] = (0.5, 1.5625)
+    """Factor on the floor's sliding friction coefficient, which is the floor's own."""
     added_mass: tuple[float, float] = (-0.5, 1.5)
     """Mass added to the trunk, kg."""
     com_offset: tuple[float, float] = (-0.02, 0.02)
@@ -48,12 +48,12 @@ class RandomizationCfg:
             ValueError: If a range is empty, or a number is out of its own.
         """
         check_ranges(self, "env.randomization", _RANGES)
-        pairs = ("friction", "added_mass", "com_offset", "gain_scale", "friction_loss")
+        pairs = ("friction_factor", "added_mass", "com_offset", "gain_scale", "friction_loss")
         check_ordered(self, "env.randomization", *pairs)
 
 
 _RANGES = {
-    "friction": Range(0.0, 10.0),
+    "friction_factor": Range(0.0, 1000.0),
     "added_mass": Range(-_TRUNK_MASS, 1000.0, above=True),  # or nothing is left of the trunk
     "com_offset": Range(-1.0, 1.0),
     "gain_scale": Range(0.0, 100.0),
@@ -78,8 +78,8 @@ def randomize_physics(
         generator: Source of the draws.
 
     Returns:
-        What the critic may know: friction, added mass, centre of mass offset, each scaled to about
-        [-1, 1]. Shape: (num_envs, PHYSICS_DIM).
+        What the critic may know: the friction's factor, added mass, centre of mass offset, each
+        scaled to about [-1, 1]. Shape: (num_envs, PHYSICS_DIM).
     """
     num_envs, model = simulation.num_envs, simulation.model
     if not cfg.enabled:
@@ -91,9 +91,9 @@ def randomize_physics(
         )
         return bounds[0] + (bounds[1] - bounds[0]) * unit
 
-    friction = draw(cfg.friction, 1)
+    friction = draw(cfg.friction_factor, 1)
     # The floor has priority and decides; the other geoms are written for whatever meets them.
-    simulation.field("geom_friction")[:, :, 0] = friction
+    simulation.field("geom_friction")[:, :, 0] *= friction
     trunk = model.body("trunk").id
     added_mass = draw(cfg.added_mass, 1)
     ratio = (model.body_mass[trunk] + added_mass) / model.body_mass[trunk]
@@ -106,7 +106,7 @@ def randomize_physics(
     simulation.set_const()
     known = torch.cat(
         (
-            _unit(friction, cfg.friction),
+            _unit(friction, cfg.friction_factor),
             _unit(added_mass, cfg.added_mass),
             _unit(com_offset, cfg.com_offset),
         ),

@@ -103,6 +103,13 @@ class Simulation(Protocol):
         """Return a model field per simulation, to be written. Shape: (num_envs, ...)."""
         ...
 
+    def read_field(self, name: str) -> torch.Tensor:
+        """Return a model field of every simulation, to be read. Shape: (num_envs, ...).
+
+        Unlike `field`, it leaves simulations that share the model's as they are.
+        """
+        ...
+
     def set_const(self) -> None:
         """Recompute the constants that depend on model fields, after writing these."""
         ...

@@ -135,6 +135,13 @@ class WarpSimulation:
             self._fields[name] = self._view(getattr(self._model, name))
         return self._fields[name]
 
+    def read_field(self, name: str) -> torch.Tensor:
+        """Return a model field of every simulation, to be read. Shape: (num_envs, ...)."""
+        if name in self._fields:
+            return self._fields[name]
+        value = torch.from_numpy(getattr(self.model, name).copy()).to(self.device)
+        return value.expand(self.num_envs, *value.shape)
+
     def set_const(self) -> None:
         """Recompute the constants that depend on model fields, after writing these."""
         for name in _DERIVED:

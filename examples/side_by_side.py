@@ -120,7 +120,6 @@ def walk(policy: Path, beta: float, num_pictures: int) -> Clip:
         MuteError: If the policy cannot be used.
     """
     from mute.acoustics.audible_env import audible_cfg
-    from mute.acoustics.gains import load_gains
     from mute.acoustics.live_listener import LiveListener
     from mute.controllers import LearnedController, load_policy
     from mute.controllers.command import Command
@@ -133,7 +132,7 @@ def walk(policy: Path, beta: float, num_pictures: int) -> Clip:
     cfg = evaluation_cfg(learned.cfg.env, num_envs=1, seconds=seconds, seed=0)
     cfg = dataclasses.replace(cfg, random_heading=False)  # along x, across the picture
     env = QuadrupedEnv(audible_cfg(cfg, _FLOOR))
-    listener = LiveListener(env, _FLOOR, load_gains())
+    listener = LiveListener(env, _FLOOR)
     session = Session(
         env, LearnedController(learned, 1), Command(_SPEED, 0.0, 0.0, beta), listener=listener
     )

@@ -69,6 +69,9 @@ MOVED: dict[str, str] = _WEIGHTS | _CONSTANTS | _HEIGHTS
 _ENGINES = {"mjbatch": "mujoco"}
 """Engines of earlier versions, and those that took their place."""
 
+_FLOOR_FRICTION = 0.8
+"""The floor's where a configuration does not name it."""
+
 _CRITICS_HEIGHTS = {"height_offset": 0.30, "height_scale": 0.1}
 """How the critic saw heights while only the estimator could be told otherwise, m."""
 
@@ -84,6 +87,7 @@ def upgraded(data: dict[str, Any]) -> dict[str, Any]:
         env["engine"] = _ENGINES[env["engine"]]
     rewards = _mapping(data, ["env", "rewards"])
     flat = rewards is not None and "terms" not in rewards and _holds(rewards, _WEIGHTS | _CONSTANTS)
+    _make_friction_a_factor(data)
     for old, new in (MOVED if flat else _HEIGHTS).items():
         _move(data, old.split("."), new.split("."))
     if rewards is not None and flat:
@@ -119,6 +123,20 @@ def _filled(given: dict[str, Any]) -> dict[str, Any]:
         if plain["weight"] != 0.0:
             terms[name] = plain
     return terms
+
+
+def _make_friction_a_factor(data: dict[str, Any]) -> None:
+    """Divide the friction that robots drew, whatever the floor, by that of the floor there was."""
+    randomization = _mapping(data, ["env", "randomization"]) or {}
+    scene = _mapping(data, ["env", "scene"]) or {}
+    drawn, floor = randomization.get("friction"), scene.get("floor_friction", _FLOOR_FRICTION)
+    if not isinstance(drawn, list | tuple) or not isinstance(floor, int | float) or floor <= 0.0:
+        return
+    if "friction_factor" not in randomization and all(
+        isinstance(each, int | float) for each in drawn
+    ):
+        del randomization["friction"]
+        randomization["friction_factor"] = [each / floor for each in drawn]
 
 
 def _give_extent_that_was(data: dict[str, Any]) -> None:

@@ -16,11 +16,12 @@ from tensordict import TensorDict
 
 from mute.controllers import LearnedController, load_policy
 from mute.envs.quadruped_env import QuadrupedEnv
-from mute.evaluation.reliability.conditions import BETAS, under_conditions
+from mute.evaluation.reliability.conditions import BETAS
 from mute.evaluation.reliability.parts import PARTS
 from mute.evaluation.reliability.starts import COMMANDS, starts_of
 from mute.evaluation.tables import read_json
 from mute.evaluation.trials import evaluation_cfg, from_the_stance, run_trial
+from mute.evaluation.usual_robots import under_conditions
 
 RESOURCES = REPOSITORY / "resources" / "go1"
 

@@ -26,8 +26,9 @@ def listening_cfg(
 ) -> QuadrupedEnvCfg:
     """Return an environment in which every physics step can be heard.
 
-    The control rate stays; the physics runs at `TIMESTEP`, forces at the feet are measured, and
-    the floor has the contact parameters of a real one.
+    The control rate stays; the physics runs at `TIMESTEP`, forces at the feet are measured,
+    friction tells sliding from sticking (elliptic cones), and the floor has the contact parameters
+    of a real one.
 
     Args:
         cfg: The environment, as `evaluation_cfg` returns it.
@@ -43,7 +44,7 @@ def listening_cfg(
             f"the control period must be a multiple of {TIMESTEP:g} s, got {cfg.step_dt:g}"
         )
     scene = dataclasses.replace(
-        cfg.scene, timestep=TIMESTEP, foot_forces=True, floor_patches=patches
+        cfg.scene, timestep=TIMESTEP, foot_forces=True, cone="elliptic", floor_patches=patches
     )
     if surface is not None:
         if surface not in FLOORS:
@@ -59,7 +60,8 @@ def audible_cfg(cfg: QuadrupedEnvCfg, surface: str | None) -> QuadrupedEnvCfg:
     Args:
         cfg: The environment, as `evaluation_cfg` returns it.
         surface: Name of the floor to walk on, at the steps of `listening_cfg`; None leaves floor
-            and physics as they are, and silent where no meter can read at their steps.
+            and physics as they are, where nothing scuffs, and silent where no meter can read at
+            their steps.
 
     Raises:
         ValueError: If the floor is not known, or does not go with the control period.

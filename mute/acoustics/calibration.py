@@ -1,4 +1,4 @@
-"""Fit the gains of the sound model: python -m mute.acoustics.calibration."""
+"""Fit the one unknown of the sound model: python -m mute.acoustics.calibration."""
 
 from __future__ import annotations
 

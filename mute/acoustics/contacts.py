@@ -65,10 +65,12 @@ class ContactBlock:
     """Feet in the world frame, m. Shape: (steps, robots, 4, 3)."""
     floor: NDArray
     """Floor under each foot, index into the recording's floor names. Shape: (steps, robots, 4)."""
-    joint_power: NDArray
-    """|torque times velocity| of each joint, W. Shape: (steps, robots, 12)."""
-    joint_speed: NDArray
-    """|velocity| of each joint, rad/s. Shape: (steps, robots, 12)."""
+    joint_pos: NDArray
+    """Angle of each joint, rad. Shape: (steps, robots, 12)."""
+    joint_vel: NDArray
+    """Velocity of each joint, rad/s. Shape: (steps, robots, 12)."""
+    joint_torque: NDArray
+    """Torque of each joint's drive, N m. Shape: (steps, robots, 12)."""
     trunk_pos: NDArray
     """Trunk in the world frame, m. Shape: (steps, robots, 3)."""
     trunk_quat: NDArray
@@ -83,6 +85,11 @@ class ContactBlock:
     def num_robots(self) -> int:
         """Number of robots."""
         return self.friction_power.shape[1]
+
+    @property
+    def joint_power(self) -> NDArray:
+        """|torque times velocity| of each joint, W. Shape: (steps, robots, 12)."""
+        return np.abs(self.joint_torque * self.joint_vel)
 
     @property
     def end(self) -> float:
@@ -110,8 +117,9 @@ class ContactBlock:
             self.friction_power[first:stop],
             self.foot_pos[first:stop],
             self.floor[first:stop],
-            self.joint_power[first:stop],
-            self.joint_speed[first:stop],
+            self.joint_pos[first:stop],
+            self.joint_vel[first:stop],
+            self.joint_torque[first:stop],
             self.trunk_pos[first:stop],
             self.trunk_quat[first:stop],
         )

@@ -3,10 +3,10 @@
 The cheap path for training curves and levels that are shown live. It knows the same sources as
 `soundscape`, and gives what a sound level meter would read at its microphone, from energies alone:
 
-- a landing deposits the A-weighted sound exposure of its response, which goes with the squares of
-  speed, mass and 1/r, and with the contact time through a table made once for each floor;
-- scuffing, drive and fan have the mean square pressure that their noise is made with, times the
-  share that the A-weighting leaves of their band;
+- a landing deposits the A-weighted sound exposure of what floor and shell make of its force
+  (`sources.exposures`), and so do teeth that meet;
+- scuffing, drive and fan have the mean square pressure that their sound is made with, times the
+  share that the A-weighting leaves of it;
 - the detector of `levels` turns the energies into Fast readings, as it does with those of sound.
 
 What it leaves out: interference of landings that fall within milliseconds of each other, the few
@@ -15,25 +15,29 @@ hundredths of a second over which the sound of a landing is drawn out, and the c
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cache
+import math
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import signal
 
-from mute.acoustics.contacts import ContactBlock
+from mute.acoustics.air import AIR_IMPEDANCE
+from mute.acoustics.body import load_transmissibility
+from mute.acoustics.contacts import ContactBlock, Impacts
 from mute.acoustics.floors import Floor, find_floors
 from mute.acoustics.metering.levels import LevelDetector, Levels
-from mute.acoustics.metering.weighting import a_weighting_db
 from mute.acoustics.microphone import Microphone, distance
-from mute.acoustics.soundscape import SOURCES, StepClock, check_sources, floor_gains
-from mute.acoustics.sources.band_noise import band_a_weight, filter_response
-from mute.acoustics.sources.drive import DRIVE_BAND, drive_squares
+from mute.acoustics.physics.room import OPEN, Room
+from mute.acoustics.soundscape import SOURCES, StepClock, check_sources
+from mute.acoustics.sources.band_noise import band_a_weight
+from mute.acoustics.sources.drive import DriveExposure
+from mute.acoustics.sources.exposures import BlowExposures, blow_exposures
 from mute.acoustics.sources.fan import fan_squares
-from mute.acoustics.sources.impacts import contact_time, floor_modes, pulse_spectrum
-from mute.acoustics.sources.scuffing import radiated_shares, sliding_squares
+from mute.acoustics.sources.landings import place_struck
+from mute.acoustics.sources.scuffing import SCUFF_BAND, scuffing_power, scuffing_squares
 
-__all__ = ["EnergyMeter", "impact_exposure"]
+__all__ = ["EnergyMeter"]
 
 _RATE = 48000
 """Sample rate whose filters are stood in for, Hz."""
@@ -41,43 +45,7 @@ _RATE = 48000
 _CHUNK = 2.0
 """Longest stretch that is added up at a time, s."""
 
-_TABLE_MASSES = np.geomspace(0.1, 10.0, 256)
-"""Masses of the table, kg; beyond its ends, its ends."""
-
-_TABLE_FREQUENCIES = np.arange(2.0, 12000.0, 2.0)
-"""Frequencies of the table's sums, Hz: far beyond the highest mode, and finer than any is wide."""
-
-
-@cache
-def _exposure_table(floor: Floor) -> NDArray[np.float64]:
-    """Return the exposure of a landing with unit m v, for `_TABLE_MASSES`.
-
-    E = (1 + e)^2 2 int |P(f)|^2 |sum H_n(f)|^2 A(f)^2 df, with the pulse of unit impulse P.
-
-    Returns:
-        Exposure times distance squared, Pa^2 s m^2 / (kg m/s)^2. Shape: (masses,).
-    """
-    angles = 2.0 * np.pi * _TABLE_FREQUENCIES / _RATE
-    response = sum(filter_response(b, a, angles) for b, a in floor_modes(floor, _RATE))
-    weighted = np.abs(response) ** 2 * 10.0 ** (a_weighting_db(_TABLE_FREQUENCIES) / 10.0)
-    duration = contact_time(_TABLE_MASSES, floor)[:, None]
-    pulse = np.abs(pulse_spectrum(_TABLE_FREQUENCIES, duration, floor.restitution))
-    width = _TABLE_FREQUENCIES[1] - _TABLE_FREQUENCIES[0]
-    return (1.0 + floor.restitution) ** 2 * 2.0 * width * (np.square(pulse) @ weighted)
-
-
-def impact_exposure(mass: NDArray, floor: Floor) -> NDArray[np.float64]:
-    """Return the A-weighted sound exposure of a landing at 1 m/s, heard from 1 m, Pa^2 s.
-
-    It goes with the square of the speed and with 1 / r^2.
-
-    Args:
-        mass: Effective mass, kg. Any shape.
-        floor: What it falls on.
-    """
-    mass = np.asarray(mass, dtype=np.float64)
-    table = _exposure_table(floor)
-    return mass**2 * np.interp(np.log(mass), np.log(_TABLE_MASSES), table)
+_Heard = tuple[NDArray, NDArray]
 
 
 class EnergyMeter:
@@ -89,7 +57,8 @@ class EnergyMeter:
         floors: Sequence[str],
         microphone: Microphone | None = None,
         sources: Sequence[str] = SOURCES,
-        gains: Mapping[str, float] | None = None,
+        transmissibility: float | None = None,
+        room: Room = OPEN,
     ) -> None:
         """Start in silence.
 
@@ -98,16 +67,21 @@ class EnergyMeter:
             floors: Names of the recording's floors, in the order of their indices.
             microphone: Where to listen. Default: on the trunk.
             sources: What to hear.
-            gains: Calibration gain by floor. Default: 1.
+            transmissibility: Share of a foot's force that comes to the shell. Default: the
+                calibration's.
+            room: Where that is.
 
         Raises:
-            ValueError: If a floor, a source or a gain is not allowed.
+            ValueError: If a floor or a source is not allowed.
         """
         self._microphone = microphone or Microphone()
         self._floors = find_floors(floors)
-        self._gains = floor_gains(floors, gains)
+        share = load_transmissibility() if transmissibility is None else transmissibility
+        self._share, self._room = share, room
+        self._lingering = {name: np.zeros((1, num_robots)) for name in SOURCES}
         squares = {
-            "impacts": self._landings,
+            "impacts": self._impacts,
+            "body": self._body,
             "scuffing": self._scuffing,
             "drive": self._drive,
             "fan": self._fan,
@@ -116,9 +90,8 @@ class EnergyMeter:
         self.exposure = {name: np.zeros(num_robots) for name in self._squares}
         """A-weighted sound exposure of each source so far, Pa^2 s. Shape of each: (num_robots,)."""
         self._clock = StepClock(num_robots)
-        bands = [band_a_weight(floor.scuff_band, _RATE) for floor in self._floors]
-        self._scuff_weights = radiated_shares(self._floors, self._gains) * bands
-        self._drive_weight = band_a_weight(DRIVE_BAND, _RATE)
+        self._scuff_weight = band_a_weight(SCUFF_BAND, _RATE)
+        self._drive_exposure = DriveExposure(num_robots, _RATE, share)
         self._num_robots = num_robots
         self._detector: LevelDetector | None = None
 
@@ -144,7 +117,8 @@ class EnergyMeter:
             where = self._microphone.position(part)
             total = np.zeros((part.steps, part.num_robots))
             for name, squares in self._squares.items():
-                own = squares(part, where)
+                direct, near = squares(part, where)
+                own = direct + self._echo(name, near, block.timestep)
                 self.exposure[name] += own.sum(axis=0) * block.timestep
                 total += own
             self._detector.update(total.T)
@@ -170,26 +144,78 @@ class EnergyMeter:
         """
         return self.detector.result()
 
-    # What follows are A-weighted mean squares by step, Pa^2. Shapes: (steps, robots).
+    def _echo(self, name: str, near: NDArray, timestep: float) -> NDArray:
+        """Return what comes back from the walls of a source, by step, Pa^2.
 
-    def _scuffing(self, block: ContactBlock, where: NDArray) -> NDArray:
-        return (self._scuff_weights[block.floor] * sliding_squares(block, where)).sum(axis=2)
+        The room fills up, and empties, by e to the power of -13.8 within its reverberation time.
 
-    def _drive(self, block: ContactBlock, where: NDArray) -> NDArray:
-        return self._drive_weight * drive_squares(block, where)
+        Args:
+            name: Of the source.
+            near: Its mean square at 1 m, Pa^2. Shape: (steps, robots).
+            timestep: s.
+        """
+        room = self._room
+        if not room.has_walls:
+            return np.zeros_like(near)
+        kept = math.exp(-math.log(1e6) * timestep / max(room.reverberation_time, timestep))
+        filled = room.echo * near
+        echo, self._lingering[name] = signal.lfilter(
+            [1.0 - kept], [1.0, -kept], filled, axis=0, zi=self._lingering[name]
+        )
+        return echo
 
-    def _fan(self, block: ContactBlock, where: NDArray) -> NDArray:
-        return fan_squares(block, where)
+    # What follows are A-weighted mean squares by step, of the direct sound at the microphone and at
+    # 1 m from a source of that power, Pa^2. Shapes: (steps, robots).
 
-    def _landings(self, block: ContactBlock, where: NDArray) -> NDArray:
+    def _scuffing(self, block: ContactBlock, where: NDArray) -> _Heard:
+        near = self._scuff_weight * scuffing_power(block) * AIR_IMPEDANCE / (2.0 * math.pi)
+        return self._scuff_weight * scuffing_squares(block, where), near
+
+    def _drive(self, block: ContactBlock, where: NDArray) -> _Heard:
+        near = self._drive_exposure.squares(block)
+        return near / np.square(distance(block.trunk_pos, where)), near
+
+    def _fan(self, block: ContactBlock, where: NDArray) -> _Heard:
+        direct = fan_squares(block, where)
+        return direct, direct * np.square(distance(block.trunk_pos, where))
+
+    def _impacts(self, block: ContactBlock, where: NDArray) -> _Heard:
         impacts, step = block.impacts, block.impact_steps()
         apart = distance(impacts.position, where[step, impacts.robot])
-        exposure = np.square(impacts.speed * self._gains[impacts.floor] / apart)
+        direct, power = np.zeros(len(impacts)), np.zeros(len(impacts))
+        for floor, here in self._by_floor(block):
+            heard = _heard_of(impacts, floor, here)
+            direct[here], power[here] = heard.floor_at(apart[here]), heard.floor_power
+        near = AIR_IMPEDANCE / (2.0 * math.pi) * power
+        return _deposited(direct, block), _deposited(near, block)
+
+    def _body(self, block: ContactBlock, where: NDArray) -> _Heard:
+        impacts, step = block.impacts, block.impact_steps()
+        near = np.zeros(len(impacts))
+        for floor, here in self._by_floor(block):
+            heard = _heard_of(impacts, floor, here)
+            near[here] = self._share**2 * heard.body
+        apart = distance(block.trunk_pos[step, impacts.robot], where[step, impacts.robot])
+        return _deposited(near / np.square(apart), block), _deposited(near, block)
+
+    def _by_floor(self, block: ContactBlock) -> Iterator[tuple[Floor, NDArray[np.bool_]]]:
+        """Yield each floor with the impacts upon it, where there are any."""
         for index, floor in enumerate(self._floors):
-            here = impacts.floor == index
+            here = block.impacts.floor == index
             if here.any():
-                exposure[here] *= impact_exposure(impacts.mass[here], floor)
-        flat = step * block.num_robots + impacts.robot
-        size = block.steps * block.num_robots
-        deposited = np.bincount(flat, weights=exposure / block.timestep, minlength=size)
-        return deposited.reshape(block.steps, block.num_robots)
+                yield floor, here
+
+
+def _heard_of(impacts: Impacts, floor: Floor, here: NDArray[np.bool_]) -> BlowExposures:
+    """Return what is heard of some impacts on one floor."""
+    mass, speed = impacts.mass[here], impacts.speed[here]
+    place = place_struck(impacts.position[here])
+    return blow_exposures(floor, mass, speed, place, impacts.foot[here])
+
+
+def _deposited(exposure: NDArray, block: ContactBlock) -> NDArray[np.float64]:
+    """Return exposures of a block's impacts, Pa^2 s, as mean squares of the steps they fall in."""
+    flat = block.impact_steps() * block.num_robots + block.impacts.robot
+    size = block.steps * block.num_robots
+    deposited = np.bincount(flat, weights=exposure / block.timestep, minlength=size)
+    return deposited.astype(np.float64).reshape(block.steps, block.num_robots)  # of none: integers

@@ -25,6 +25,7 @@ from mute.acoustics.files.writing import WavWriter
 from mute.acoustics.metering.levels import settling_time
 from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
 from mute.acoustics.microphone import Microphone
+from mute.acoustics.physics.room import OPEN, Room
 from mute.acoustics.recorder import FloorAt, Recorder
 from mute.acoustics.soundscape import SOURCES, Soundscape
 from mute.acoustics.tally import HeardLevels, Tally
@@ -35,9 +36,9 @@ __all__ = ["SAMPLE_RATE", "WAV_FULL_SCALE", "Listener"]
 SAMPLE_RATE = 48000
 """Of all sound that is made here, Hz."""
 
-WAV_FULL_SCALE = 4.0
+WAV_FULL_SCALE = 10.0
 """Sound pressure of a full-scale sample in a WAV file, Pa. Always the same, so that a quiet walk
-sounds quiet beside a loud one; 4 Pa is a peak of 106 dB."""
+sounds quiet beside a loud one; 10 Pa is a peak of 114 dB, as a boarded floor has under a foot."""
 
 
 class Listener:
@@ -56,7 +57,6 @@ class Listener:
         floors: Sequence[str],
         floor_at: FloorAt | int = 0,
         microphone: Microphone | None = None,
-        gains: Mapping[str, float] | None = None,
         sources: Sequence[str] = SOURCES,
         settle_time: float = 1.0,
         seed: int = 0,
@@ -65,6 +65,7 @@ class Listener:
         robots: slice | None = None,
         from_energies: bool = False,
         wav_start: float | None = None,
+        room: Room = OPEN,
     ) -> None:
         """Begin to listen.
 
@@ -73,7 +74,6 @@ class Listener:
             floors: Names of the floors, in the order of their indices.
             floor_at: Index of the floor under world positions, see `Recorder`.
             microphone: Where to listen. Default: on the trunk.
-            gains: Calibration gain by floor. Default: 1.
             sources: What to hear, of `soundscape.SOURCES`.
             settle_time: Time that the figures leave out, at the start and after each fall, s.
             seed: Of all noise.
@@ -83,10 +83,13 @@ class Listener:
             from_energies: Take the levels from `EnergyMeter`, without making sound that no file
                 wants. Files change no figure then.
             wav_start: Time at which the sound in the files begins, s. Default: `settle_time`.
+            room: Where it is heard. Sound of one with walls needs pyroomacoustics.
 
         Raises:
-            ValueError: If a floor, a source or a gain is not allowed, or the environment does not
-                measure what is needed.
+            MuteError: If there is no calibration, or what the sound of a room needs is not
+                installed.
+            ValueError: If a floor or a source is not allowed, or the environment does not measure
+                what is needed.
         """
         self.clipped: dict[int, int] = {}
         """Samples beyond full scale in each robot's file, once it is complete."""
@@ -95,7 +98,7 @@ class Listener:
         self._count = len(range(env.num_envs)[self._robots])
         self._recorder = Recorder(env, floor_at, robots)
         self._make_energy_meter = lambda: EnergyMeter(
-            self._count, floors, microphone, sources, gains
+            self._count, floors, microphone, sources, room=room
         )
         self._from_energies = from_energies
         self._paths = {0: wav} if isinstance(wav, Path) else dict(wav or {})
@@ -104,7 +107,7 @@ class Listener:
         self._soundscape = None
         if self._paths or not from_energies:
             self._soundscape = Soundscape(
-                self._count, floors, microphone, SAMPLE_RATE, seed, sources, gains
+                self._count, floors, microphone, SAMPLE_RATE, seed, sources, room=room
             )
         self._settle_steps = round(settle_time / env.step_dt)
         self._read_steps = self._settle_steps + math.ceil(settling_time("fast") / env.step_dt)

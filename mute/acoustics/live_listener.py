@@ -7,7 +7,7 @@ no figure. Tables of many trials are `mute.evaluation`'s.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 
@@ -33,7 +33,6 @@ class LiveListener:
         self,
         env: QuadrupedEnv,
         surface: str,
-        gains: Mapping[str, float],
         settle_time: float = 1.0,
         seed: int = 0,
         wav: Path | None = None,
@@ -45,7 +44,6 @@ class LiveListener:
         Args:
             env: The environment, with `scene.foot_forces`; call `listen` after each of its steps.
             surface: Name of the floor to hear.
-            gains: Calibration gain of each floor.
             settle_time: Time that `levels` leaves out, at the start and after each fall, s.
             seed: Of the noise in the sound.
             wav: File for the sound from the first step on, as a film has it; it begins on entering.
@@ -62,7 +60,6 @@ class LiveListener:
             env,
             [surface],
             microphone=microphone,
-            gains=gains,
             sources=sources,
             settle_time=settle_time,
             seed=seed,

@@ -1,7 +1,8 @@
 """Where the listening is done, and what becomes of sound on the way there.
 
-Sound spreads as in the open: amplitude 1/r (-6.02 dB a doubling of the distance), delay r/c. Walls,
-their echo, and the robot's own shadow are left out.
+The direct sound of what is small falls with 1/r (-6.02 dB a doubling of the distance) and comes
+after r/c; a floor that rings is near wherever one stands on it (`physics.plate`). What walls give
+back is `physics.room`'s. The robot's own shadow is left out.
 """
 
 from __future__ import annotations
@@ -13,22 +14,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mute.acoustics.air import AIR_IMPEDANCE
 from mute.acoustics.contacts import ContactBlock
 
 __all__ = [
-    "AIR_IMPEDANCE",
-    "SPEED_OF_SOUND",
     "TRUNK_OFFSET",
     "Microphone",
     "distance",
     "mean_square",
 ]
-
-SPEED_OF_SOUND = 343.0
-"""In air of 20 degrees Celsius, m/s."""
-
-AIR_IMPEDANCE = 413.0
-"""Density of air times speed of sound at 20 degrees Celsius, Pa s / m."""
 
 MIN_DISTANCE = 0.05
 """Sources are no points: nobody hears them from nearer than this, m (chosen)."""

@@ -1,18 +1,18 @@
-"""Where modelled levels come from: the policy, the gains, the commit and the machine."""
+"""Where modelled levels come from: the policy, the calibration, the commit and the machine."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
-from mute.acoustics.gains import GAINS_FILE
+from mute.acoustics.body import CALIBRATION_FILE
 from mute.support.provenance import REPOSITORY, current_commit, file_sha256, machine_kind
 
 __all__ = ["sound_origin"]
 
 
 def sound_origin(policy: Path) -> dict[str, str]:
-    """Return what modelled levels rest on, as plain data: policy, gains, commit and machine.
+    """Return what modelled levels rest on, as plain data: policy, calibration, commit and machine.
 
     Ask before measuring: a file may be replaced while that runs.
 
@@ -22,7 +22,7 @@ def sound_origin(policy: Path) -> dict[str, str]:
     return {
         "policy": os.path.relpath(policy, REPOSITORY),
         "policy_sha256": file_sha256(policy),
-        "calibration_sha256": file_sha256(GAINS_FILE),
+        "calibration_sha256": file_sha256(CALIBRATION_FILE),
         "commit": current_commit(),
         "machine": machine_kind(),
     }

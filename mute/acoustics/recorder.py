@@ -25,10 +25,9 @@ _RELEASE = 0.005
 contact that carries little load for a step or two; a foot that is off the ground that shortly
 cannot have gathered speed."""
 
-_CREEP = 0.02
-"""Sliding speed up to which a foot counts as sticking, m/s (chosen). MuJoCo's friction is soft: a
-foot that carries load creeps, where a real one stands. From 1 to 5 cm/s scuffing changes by 3 dB on
-wood, and the mean level of a walk by less than 0.3 dB."""
+_AT_LIMIT = 0.99
+"""Share of the largest friction from which on a foot slides. With an elliptic cone the solver puts
+the force of a sliding foot exactly on the cone."""
 
 _RECORDED = ("sensordata", "qpos", "qvel", "actuator_force")
 """What is kept of every physics step, of the engine's arrays."""
@@ -39,8 +38,9 @@ FloorAt = Callable[[NDArray[np.floating]], NDArray[np.integer]]
 class Recorder:
     """Keeps the state of every physics step of an environment, and makes blocks of it.
 
-    The environment needs `scene.foot_forces`. A robot that begins anew in between jumps, drops and
-    lands: whoever resets robots calls `restart`.
+    The environment needs `scene.foot_forces`. With pyramidal cones, whose friction is never quite
+    used up, no foot is known to slide, and none scuffs; `scene.cone` elliptic tells. A robot that
+    begins anew in between jumps, drops and lands: whoever resets robots calls `restart`.
     """
 
     def __init__(
@@ -77,6 +77,7 @@ class Recorder:
         self._recorded = 0
         self._release = max(1, round(_RELEASE / self.timestep))
         self._last_qpos = env.simulation.qpos.numpy()[self._robots].copy()
+        self._friction = _friction(env, floor_at)[self._robots]
         # All begin on the ground: the first contact is no impact.
         self._touched = np.ones((self._release, len(self._last_qpos), feet), dtype=bool)
         self._stood = np.ones((len(self._last_qpos), feet), dtype=bool)
@@ -122,16 +123,16 @@ class Recorder:
             for name in ("pos", "vel", "force", "angvel")
         }
         floor = self._floor(vectors["pos"][..., :2])
-        joint_speed = np.abs(rows["qvel"][:, :, 6:])
         block = ContactBlock(
             start=start,
             timestep=self.timestep,
             impacts=self._impacts(start, sensors["contact"] > 0.0, vectors, floor, rows["qpos"]),
-            friction_power=_friction_power(vectors),
+            friction_power=_friction_power(vectors, self._limit(floor, vectors["force"])),
             foot_pos=vectors["pos"],
             floor=floor,
-            joint_power=np.abs(rows["actuator_force"]) * joint_speed,
-            joint_speed=joint_speed,
+            joint_pos=rows["qpos"][:, :, 7:],
+            joint_vel=rows["qvel"][:, :, 6:],
+            joint_torque=rows["actuator_force"],
             trunk_pos=rows["qpos"][:, :, :3],
             trunk_quat=rows["qpos"][:, :, 3:7],
         )
@@ -162,6 +163,15 @@ class Recorder:
         if callable(self._floor_at):
             return self._floor_at(xy)
         return np.full(xy.shape[:-1], self._floor_at, dtype=np.int8)
+
+    def _limit(
+        self, floor: NDArray[np.integer], force: NDArray[np.floating]
+    ) -> NDArray[np.floating]:
+        """Return the largest friction of each foot on its floor, N. Shape: (steps, robots, 4)."""
+        robot = np.arange(floor.shape[1])[:, None]
+        friction = self._friction[robot, floor if self._friction.shape[1] > 1 else 0]
+        # Feet in the air, whose limit is none or no number, have no force to slide with either.
+        return friction * np.maximum(np.abs(force[..., 2]), 1e-6)
 
     def _impacts(
         self,
@@ -239,11 +249,39 @@ def effective_mass(
     return result
 
 
-def _friction_power(vectors: dict[str, NDArray]) -> NDArray[np.floating]:
+def _friction(env: QuadrupedEnv, floor_at: FloorAt | int) -> NDArray[np.floating]:
+    """Return every robot's friction coefficient on each floor, by its index.
+
+    Shape: (robots, floors); (robots, 1) where there is but one to stand on.
+    """
+    model = env.model
+    ground = np.flatnonzero(model.geom_bodyid == 0)
+    if len(ground) > 1:  # beside patches, the endless floor is but a backdrop
+        ground = ground[ground != model.geom("floor").id]
+    friction = env.simulation.read_field("geom_friction")[:, ground, 0].numpy(force=True)
+    if model.opt.cone != mujoco.mjtCone.mjCONE_ELLIPTIC:
+        friction = np.full_like(friction, np.inf)
+    if len(ground) == 1 or not callable(floor_at):
+        return friction[:, :1]
+    floor = floor_at(model.geom_pos[ground, :2])
+    known = np.zeros((len(friction), int(floor.max()) + 1), dtype=friction.dtype)
+    known[:, floor] = friction
+    return known
+
+
+def _friction_power(
+    vectors: dict[str, NDArray], limit: NDArray[np.floating]
+) -> NDArray[np.floating]:
     """Return the power that each foot loses to the floor by sliding, W. Shape: (steps, robots, 4).
 
-    It is taken where the foot touches: a foot that rolls does not slide, though its centre moves.
-    The force is the foot's on the floor.
+    A foot slides where its friction is as large as it can be. Below that it sticks: there a real
+    foot's rubber shears, and one of MuJoCo, whose friction is soft, creeps, neither of which rubs.
+    The speed is taken where the foot touches: a foot that rolls does not slide, though its centre
+    moves. The force is the foot's on the floor.
+
+    Args:
+        vectors: What was measured at the feet. Each array's shape: (steps, robots, 4, 3).
+        limit: The largest friction there can be, N. Shape: (steps, robots, 4).
     """
     x, y = vectors["vel"][..., 0], vectors["vel"][..., 1]
     turn_x, turn_y = vectors["angvel"][..., 0], vectors["angvel"][..., 1]
@@ -251,4 +289,5 @@ def _friction_power(vectors: dict[str, NDArray]) -> NDArray[np.floating]:
     slide_x, slide_y = x - turn_y * FOOT_RADIUS, y + turn_x * FOOT_RADIUS
     force = vectors["force"]
     power = np.maximum(force[..., 0] * slide_x + force[..., 1] * slide_y, 0.0)
-    return np.where(np.hypot(slide_x, slide_y) > _CREEP, power, 0.0)
+    slides = np.hypot(force[..., 0], force[..., 1]) >= _AT_LIMIT * limit
+    return np.where(slides, power, 0.0)

@@ -7,23 +7,27 @@ the others. Each robot is in a world, and at a microphone, of its own.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mute.acoustics.body import load_transmissibility
 from mute.acoustics.contacts import ContactBlock
 from mute.acoustics.floors import find_floors
 from mute.acoustics.microphone import Microphone
-from mute.acoustics.sources.drive import Drive
+from mute.acoustics.physics.room import OPEN, Room
+from mute.acoustics.room_sound import RoomSound, near_feet, near_floors, near_trunk
+from mute.acoustics.sources.band_noise import spread
+from mute.acoustics.sources.drive import DriveSound
 from mute.acoustics.sources.fan import Fan
-from mute.acoustics.sources.impacts import ImpactSound
+from mute.acoustics.sources.landings import LandingSound
 from mute.acoustics.sources.scuffing import Scuffing
 
-__all__ = ["SOURCES", "Soundscape", "StepClock", "check_sources", "floor_gains"]
+__all__ = ["SOURCES", "Soundscape", "StepClock", "check_sources"]
 
-SOURCES = ("impacts", "scuffing", "drive", "fan")
+SOURCES = ("impacts", "body", "drive", "scuffing", "fan")
 """All that can be heard, each alone or together."""
 
 _CHUNK = 0.1
@@ -46,18 +50,6 @@ def check_sources(sources: Sequence[str]) -> tuple[str, ...]:
     if not sources:
         raise ValueError(f"sources must be of {', '.join(SOURCES)}, got none")
     return tuple(sources)
-
-
-def floor_gains(floors: Sequence[str], gains: Mapping[str, float] | None) -> NDArray[np.float64]:
-    """Return the calibration gain of each floor, 1 where none is given. Shape: (floors,).
-
-    Raises:
-        ValueError: If a gain is not a finite number above zero.
-    """
-    values = np.array([1.0 if gains is None else gains.get(name, 1.0) for name in floors])
-    if not (np.isfinite(values).all() and (values > 0.0).all()):
-        raise ValueError(f"gains must be finite and positive, got {dict(gains or {})}")
-    return values
 
 
 class StepClock:
@@ -99,7 +91,8 @@ class Soundscape:
         sample_rate: int = 48000,
         seed: int = 0,
         sources: Sequence[str] = SOURCES,
-        gains: Mapping[str, float] | None = None,
+        transmissibility: float | None = None,
+        room: Room = OPEN,
     ) -> None:
         """Start in silence.
 
@@ -110,10 +103,13 @@ class Soundscape:
             sample_rate: Hz.
             seed: Of all noise.
             sources: What to hear, of `SOURCES`.
-            gains: Calibration gain by floor; it acts on impacts and scuffing. Default: 1.
+            transmissibility: Share of a foot's force that comes to the robot's shell. Default: the
+                calibration's.
+            room: Where it is heard. One with walls needs pyroomacoustics.
 
         Raises:
-            ValueError: If a floor, a source, a gain, or the sample rate is not allowed.
+            MuteError: If what a room needs is not installed.
+            ValueError: If a floor, a source or the sample rate is not allowed.
         """
         if sample_rate < 8000:
             raise ValueError(f"sample_rate must be at least 8000 Hz, got {sample_rate}")
@@ -121,18 +117,24 @@ class Soundscape:
         self.sample_rate = sample_rate
         self.microphone = microphone or Microphone()
         known = find_floors(floors)
-        factors = floor_gains(floors, gains)
+        share = load_transmissibility() if transmissibility is None else transmissibility
+        heard = check_sources(sources)
         # A source keeps its seed whatever else is heard.
         seeds = {name: (seed, index) for index, name in enumerate(SOURCES)}
-        makers = {
-            "impacts": lambda: ImpactSound(num_robots, known, factors, sample_rate),
-            "scuffing": lambda: Scuffing(
-                num_robots, known, factors, sample_rate, seeds["scuffing"]
-            ),
-            "drive": lambda: Drive(num_robots, sample_rate, seeds["drive"]),
+        makers: dict[str, Callable[[], _Source]] = {
+            "impacts": lambda: LandingSound(num_robots, known, sample_rate),
+            "body": lambda: LandingSound(num_robots, known, sample_rate, False, share),
+            "drive": lambda: DriveSound(num_robots, sample_rate, share),
+            "scuffing": lambda: Scuffing(num_robots, sample_rate, seeds["scuffing"]),
             "fan": lambda: Fan(num_robots, sample_rate, seeds["fan"]),
         }
-        self._sources: list[_Source] = [makers[name]() for name in check_sources(sources)]
+        self._sources = [makers[name]() for name in heard]
+        self._room: RoomSound | None = None
+        if room.has_walls:
+            self._room = RoomSound(num_robots, sample_rate, room)
+            of_floors = near_floors(known)
+            nearness = {"impacts": of_floors, "scuffing": near_feet}
+            self._nearness = [nearness.get(name, near_trunk) for name in heard]
         self._clock = StepClock(num_robots)
 
     def render(self, block: ContactBlock) -> NDArray[np.float32]:
@@ -158,6 +160,13 @@ class Soundscape:
             part = block.part(first, stop)
             where = self.microphone.position(part)
             edges = bounds[first : stop + 1]
-            heard = sum(source.render(part, where, edges) for source in self._sources)
-            out[:, edges[0] - bounds[0] : edges[-1] - bounds[0]] = heard
+            heard = [source.render(part, where, edges) for source in self._sources]
+            total = sum(heard)
+            if self._room is not None:
+                near = sum(
+                    spread(nearness(part, where), edges) * own
+                    for nearness, own in zip(self._nearness, heard, strict=True)
+                )
+                total = total + self._room.render(np.asarray(near))
+            out[:, edges[0] - bounds[0] : edges[-1] - bounds[0]] = total
         return out

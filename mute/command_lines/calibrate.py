@@ -1,9 +1,9 @@
-"""Fit the model's gains: python -m mute.acoustics.calibration --policy FILE.
+"""Fit the one unknown of the sound model: python -m mute.acoustics.calibration --policy FILE.
 
-What is fitted is one gain a floor and nothing else, on the sound of the feet (impacts and
-scuffing), such that a reference policy at 0.5 m/s has the mean noise level (MNL) that the paper
-measured of the real robot on that floor. All else that the model then says (peaks, other betas,
-other speeds, other policies) is a prediction.
+That is the transmissibility, the share of a force at a foot that comes to the robot's shell. It is
+fitted on one row of the paper: such that a reference policy at 0.5 m/s on a floor has the mean
+noise level (MNL) that was measured of the real robot there. All else that the model then says
+(other floors, peaks, other betas, speeds and policies) is a prediction.
 """
 
 from __future__ import annotations
@@ -18,12 +18,10 @@ from typing import Any, Literal
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from rich.progress import track
 from scipy.optimize import brentq
 
 from mute.acoustics.audible_env import make_listening_env
-from mute.acoustics.floors import FLOORS, OWN_GAINS
-from mute.acoustics.gains import GAINS_FILE
+from mute.acoustics.body import CALIBRATION_FILE
 from mute.acoustics.listener import SAMPLE_RATE
 from mute.acoustics.metering.sound_level_meter import measure
 from mute.acoustics.recorder import Recorder
@@ -38,45 +36,55 @@ from mute.command_lines.arguments import (
     parse,
 )
 from mute.command_lines.policy_options import PolicyArgs
-from mute.command_lines.sound_options import load_audible_policy
+from mute.command_lines.sound_options import (
+    load_audible_policy,
+    progress_bar,
+    warn_if_not_known_well,
+)
 from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
+from mute.evaluation.intervals import mean_with_interval
 from mute.evaluation.noise_levels import SETTLE_TIME
 from mute.evaluation.paper_levels import PAPER_LEVELS
-from mute.evaluation.tables import print_table, write_json
-from mute.evaluation.trials import evaluation_cfg, run_trial
+from mute.evaluation.tables import write_json
+from mute.evaluation.trials import run_trial
+from mute.evaluation.usual_robots import robots_cfg
 from mute.support.errors import MuteError
 from mute.support.provenance import REPOSITORY, current_commit, file_sha256, machine_kind
 from mute.support.ranges import Range
 
-__all__ = ["CalibrationArgs", "fit_gain", "main", "provenance"]
+__all__ = ["REFERENCES", "CalibrationArgs", "fit_share", "main", "provenance"]
 
-_REFERENCES = {"mute": "mute beta 0", "dreamwaq": "dreamwaq"}
+REFERENCES = {"mute": "mute beta 0", "dreamwaq": "dreamwaq"}
 """Rows of the paper that can be fitted, by the argument that names them."""
 
-_SAME_AS = {"concrete": "tile"}
-"""Floors that the paper did not measure at 0.5 m/s, and the one whose gain they take (chosen: both
-are hard mineral slabs)."""
+_MOST_SOUND = 2000.0
+"""Most sound that is held, s of all robots together: 0.8 GB."""
+
+_STRETCH = 0.5
+"""Time that is worked on at once, s."""
 
 
 @dataclass
 class CalibrationArgs(PolicyArgs):
-    """Fit one gain a floor to the levels that the paper measured.
+    """Fit the transmissibility to one level that the paper measured.
 
     The policy stands for the one that the paper measured.
     """
 
     reference: Literal["mute", "dreamwaq"] = "mute"
     """The paper's row to fit: MUTE with beta = 0, or DreamWaQ."""
+    floor: Literal["wood", "carpet", "tile"] = "wood"
+    """Floor that it is fitted on."""
     speed: float = 0.5
     """Commanded speed, m/s."""
-    trials: int = 5
-    """Robots that walk on each floor."""
-    seconds: float = 10.0
+    trials: int = 64
+    """Robots that walk, side by side."""
+    seconds: float = 3.0
     """Length of a trial, s."""
     seed: int = 1
-    """Seed of initial states and of the noise."""
-    out: Path = GAINS_FILE
+    """Seed of the robots' physics, of initial states and of the noise."""
+    out: Path = CALIBRATION_FILE
     """File to write."""
 
 
@@ -89,6 +97,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = parse(CalibrationArgs, command_line() if argv is None else argv, __doc__ or "")
     check_option("trials", args.trials, MANY_ROBOTS)
     check_option("seconds", args.seconds, Range(2.0, LONGEST_WALK))
+    if args.trials * args.seconds > _MOST_SOUND:
+        raise MuteError(
+            f"--trials {args.trials} of --seconds {args.seconds:g} is more sound than the "
+            f"{_MOST_SOUND:g} s that are held at a time"
+        )
     check_option("speed", args.speed, Range(0.0, 1.0, above=True))
     check_seed(args.seed)
     args = args.with_policy_found()
@@ -97,27 +110,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     if args.out.is_dir():
         raise MuteError(f"--out {args.out}: must name a file, and is a directory")
     origin = provenance(args, policy)  # now: a file may be replaced while this runs
-    targets = PAPER_LEVELS[_REFERENCES[args.reference]]
-    rows = {
-        name: _fit_floor(args, policy, name, mnl)
-        for name, (mnl, _) in track(targets.items(), "floors")
-    }
-    for name, other in _SAME_AS.items():
-        rows[name] = {"gain": rows[other]["gain"], "source": f"chosen: as {other}"}
-    assert set(rows) == FLOORS.keys() - OWN_GAINS.keys()
-    write_json(args.out, origin | {"floors": rows})
-    table = [{"floor": name, **row} for name, row in rows.items()]
-    columns = ["floor", "gain", "target_mnl", "mnl", "pnl"]
-    print_table("gains", [{key: row.get(key) for key in columns} for row in table], columns)
+    target, _ = PAPER_LEVELS[REFERENCES[args.reference]][args.floor]
+    fitted = _fitted(args, policy, target)
+    write_json(args.out, origin | {"reference": args.reference} | fitted)
+    print(
+        f"transmissibility {fitted['transmissibility']:.4f}: MNL {fitted['mnl']:.2f} dBA on "
+        f"{args.floor}, the paper's {target:.2f}; PNL {fitted['pnl']:.2f}"
+    )
     print(f"written: {args.out}")
     return 0
 
 
 def provenance(args: CalibrationArgs, policy: Policy) -> dict[str, Any]:
-    """Return where gains come from, as plain data; paths are relative to the repository."""
+    """Return where a calibration comes from, as plain data; paths are the repository's."""
     options = {
         "policy": os.path.relpath(args.policy, REPOSITORY),
         "reference": args.reference,
+        "floor": args.floor,
         "speed": f"{args.speed:g}",
         "trials": args.trials,
         "seconds": f"{args.seconds:g}",
@@ -138,66 +147,95 @@ def provenance(args: CalibrationArgs, policy: Policy) -> dict[str, Any]:
     }
 
 
-def fit_gain(mnl: Callable[[float], float], target: float) -> float:
-    """Return the gain at which a level reaches its target, to 0.01 dB.
+def fit_share(mnl: Callable[[float], float], target: float) -> float:
+    """Return the share at which a level reaches its target, to 0.01 dB.
 
     Args:
-        mnl: Level as a function of the gain, rising, dB.
+        mnl: Level as a function of the share, rising, dB.
         target: dB.
 
     Raises:
-        ValueError: If no gain from 1e-4 to 1e4 reaches it, as when other sources alone exceed it.
+        ValueError: If no share from 1e-4 to 1 reaches it, as when other sources alone exceed it.
     """
-    low, high = -80.0, 80.0
-    if not mnl(10.0 ** (low / 20.0)) < target < mnl(10.0 ** (high / 20.0)):
-        raise ValueError(f"no gain gives {target:g} dB")
+    low, high = -80.0, 0.0
+    faintest, loudest = (mnl(10.0 ** (db / 20.0)) for db in (low, high))
+    if not faintest < target < loudest:
+        raise ValueError(
+            f"no share of a foot's force gives {target:g} dB: it is {faintest:.1f} without the "
+            f"robot's own sound, and {loudest:.1f} with all of the force"
+        )
     decibels = brentq(lambda db: mnl(10.0 ** (db / 20.0)) - target, low, high, xtol=0.005)
     return 10.0 ** (float(decibels) / 20.0)  # pyright: ignore[reportArgumentType]
 
 
-def _fit_floor(args: CalibrationArgs, policy: Policy, floor: str, target: float) -> dict:
-    feet, rest = _walk(args, policy, floor)
+def _fitted(args: CalibrationArgs, policy: Policy, target: float) -> dict[str, Any]:
+    """Return what was fitted, and the levels that come of it."""
+    robot, rest = _walk(args, policy)
 
-    def levels(gain: float) -> tuple[float, float]:
-        trials = measure(gain * feet + rest, SAMPLE_RATE)
-        mnl = float(np.mean([trial.mnl for trial in trials]))
-        return mnl, float(np.mean([trial.pnl for trial in trials]))
+    def levels(share: float) -> tuple[list[float], list[float]]:
+        trials = measure(share * robot + rest, SAMPLE_RATE)
+        return [trial.mnl for trial in trials], [trial.pnl for trial in trials]
 
     try:
-        gain = fit_gain(lambda value: levels(value)[0], target)
+        share = fit_share(lambda value: float(np.mean(levels(value)[0])), target)
     except ValueError as error:
-        raise MuteError(f"{floor}: {error} with {args.policy}") from error
-    mnl, pnl = levels(gain)
+        raise MuteError(f"{args.floor}: {error} with {args.policy}") from error
+    mnl, pnl = levels(share)
+    mean, _, half_width = mean_with_interval(mnl)
+    warn_if_not_known_well(half_width)
     return {
-        "gain": gain,
+        "transmissibility": share,
+        "floor": args.floor,
         "target_mnl": target,
-        "source": f"the paper's table of noise levels, {args.reference}",
-        "mnl": mnl,
-        "pnl": pnl,
+        "source": f"the paper's table of noise levels, {REFERENCES[args.reference]}",
+        "mnl": mean,
+        "mnl_ci95": half_width,
+        "pnl": float(np.mean(pnl)),
+        "robots": len(robot),
     }
 
 
-def _walk(args: CalibrationArgs, policy: Policy, floor: str) -> tuple[NDArray, NDArray]:
-    """Return what the feet sound of, and all else, Pa. Shapes: (trials, samples)."""
-    cfg = evaluation_cfg(policy.cfg.env, args.trials, args.seconds + SETTLE_TIME, args.seed)
-    env = make_listening_env(cfg, floor)
+def _walk(args: CalibrationArgs, policy: Policy) -> tuple[NDArray, NDArray]:
+    """Return what the robots sound of with all of the force in the shell, and all else, Pa.
+
+    Of robots that fall nothing is taken. Shapes: (robots, samples).
+
+    Raises:
+        MuteError: If all fall.
+    """
+    cfg = robots_cfg(policy, args.trials, args.seconds + SETTLE_TIME, args.seed)
+    env = make_listening_env(cfg, args.floor)
     recorder = Recorder(env)
     scapes = [
-        Soundscape(args.trials, [floor], None, SAMPLE_RATE, args.seed, sources)
-        for sources in (("impacts", "scuffing"), ("drive", "fan"))
+        Soundscape(args.trials, [args.floor], None, SAMPLE_RATE, args.seed, sources, 1.0)
+        for sources in (("body", "drive"), ("impacts", "scuffing", "fan"))
     ]
-    heard: list[tuple[NDArray, ...]] = []
-
-    def listen(_: object, dones: torch.Tensor) -> None:
-        if bool(dones.any()):  # a fall: an episode is longer than the trial
-            raise MuteError(f"{args.policy} falls on {floor}: it cannot be the reference")
-        block = recorder.take()
-        heard.append(tuple(scape.render(block) for scape in scapes))
-
     steps = round((args.seconds + SETTLE_TIME) / env.step_dt)
+    samples = round(steps * env.step_dt * SAMPLE_RATE)
+    heard = np.empty((2, args.trials, samples), dtype=np.float32)
+    stood = np.ones(args.trials, dtype=bool)
+    stretch, done, filled = max(1, round(_STRETCH / env.step_dt)), 0, 0
+
+    def listen(advance: Callable[[float], None], dones: torch.Tensor) -> None:
+        nonlocal done, filled
+        done += 1
+        stood[dones.numpy()] = False
+        if bool(dones.any()):
+            recorder.restart(dones.numpy(), env.unstable.numpy())
+        if done % stretch == 0 or done == steps:
+            block = recorder.take()
+            sounds = [scape.render(block) for scape in scapes]
+            stop = filled + sounds[0].shape[1]
+            heard[:, :, filled:stop] = sounds
+            filled = stop
+            advance(done)
+
     command = torch.tensor((args.speed, 0.0, 0.0, 0.0))
-    controller = LearnedController(policy, args.trials)
-    run_trial(env, controller, command, steps, listen)
-    first = round(SETTLE_TIME * SAMPLE_RATE)
-    feet, rest = (np.concatenate(part, axis=1)[:, first:] for part in zip(*heard, strict=True))
-    return feet, rest
+    torch.set_num_threads(1)  # the physics engine has the cores
+    with progress_bar("walk", steps) as advance:
+        controller = LearnedController(policy, args.trials)
+        run_trial(env, controller, command, steps, lambda _, dones: listen(advance, dones))
+    if not stood.any():
+        raise MuteError(f"{args.policy} falls on {args.floor}: it cannot be the reference")
+    robot, rest = heard[:, stood, round(SETTLE_TIME * SAMPLE_RATE) : filled]
+    return robot, rest

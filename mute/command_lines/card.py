@@ -11,14 +11,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mute.acoustics.body import CALIBRATION_FILE
 from mute.command_lines.arguments import command_line, make_directory, parse
+from mute.command_lines.calibrate import REFERENCES
 from mute.command_lines.card_benchmark import BenchmarkFiles, benchmark_page
 from mute.command_lines.card_reliability import SeedFiles, read_seeds
 from mute.command_lines.card_results import ResultFiles, results_page
+from mute.command_lines.card_sound import predicted_and_measured, with_levels
+from mute.evaluation.paper_levels import PAPER_LEVELS
 from mute.evaluation.tables import read_json
 from mute.support.errors import MuteError
 from mute.support.files import write_file
-from mute.support.provenance import REPOSITORY
+from mute.support.provenance import REPOSITORY, file_sha256
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK
 
@@ -43,7 +47,7 @@ class CardArgs:
     """File that `mute.benchmark --out` wrote; peers.json, peer_walks.json, physics.json and
     walking.json lie beside it."""
     out: Path | None = None
-    """Directory of the pages results.md and benchmark.md; printed if not given."""
+    """Directory of the pages results.md, sound.md and benchmark.md; printed if not given."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -54,8 +58,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     argv = command_line() if argv is None else list(argv)
     args = parse(CardArgs, argv, "Write what was measured as pages in Markdown.")
+    results = read_results(args)
     pages = {
-        "results.md": results_page(read_results(args)),
+        "results.md": results_page(results),
+        "sound.md": with_levels(
+            _sound_page(),
+            predicted_and_measured(results.noise, results.sweep_beta, results.walk, results.fitted),
+        ),
         "benchmark.md": benchmark_page(read_benchmarks(args)),
     }
     if args.out is None:
@@ -86,6 +95,8 @@ def read_results(args: CardArgs) -> ResultFiles:
         sweep_speed=_read(beside / "sweep_speed.json"),
         sweep_beta=_read(beside / "sweep_beta.json"),
         walk=_read(beside / "walk.json"),
+        fitted=_fitted_row(),
+        calibration=file_sha256(CALIBRATION_FILE),
     )
 
 
@@ -124,6 +135,34 @@ def _check_trainings(folder: Path, card: Mapping[str, Any], seeds: Mapping[int, 
             told = [row["beta"] for row in run.gait[part]]
             if told != betas:
                 raise MuteError(f"{path} has betas {told} in {part}, what ships has {betas}")
+
+
+def _sound_page() -> str:
+    """Return the page that one part of is made here.
+
+    Raises:
+        MuteError: If it is not there.
+    """
+    path = _DOCS / "sound.md"
+    if not path.is_file():
+        raise MuteError(f"no file at {path}")
+    return path.read_text()
+
+
+def _fitted_row() -> tuple[str, str]:
+    """Return the row of the paper that the calibration is of, and the floor.
+
+    Raises:
+        MuteError: If the calibration does not say.
+    """
+    calibration = _read(CALIBRATION_FILE, "reference", "floor")
+    reference = calibration["reference"]
+    if reference not in REFERENCES:
+        raise MuteError(f"{CALIBRATION_FILE}: reference must be of {', '.join(REFERENCES)}")
+    floors = PAPER_LEVELS[REFERENCES[reference]]
+    if calibration["floor"] not in floors:
+        raise MuteError(f"{CALIBRATION_FILE}: floor must be of {', '.join(floors)}")
+    return REFERENCES[reference], calibration["floor"]
 
 
 def read_benchmarks(args: CardArgs) -> BenchmarkFiles:

@@ -59,7 +59,7 @@ def meter() -> NoReturn:
 
 
 def calibrate() -> NoReturn:
-    """Fit the gains of the sound model: `python -m mute.acoustics.calibration`."""
+    """Fit the one unknown of the sound model: `python -m mute.acoustics.calibration`."""
     _start("calibrate", keeps_files=True)
 
 

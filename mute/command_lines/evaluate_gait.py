@@ -26,9 +26,9 @@ from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.estimation_errors import EstimationMeter
 from mute.evaluation.matched_speed import sweep_beta_at_speed
 from mute.evaluation.progress import Milestone, checkpoints_of, training_minutes, walks
-from mute.evaluation.reliability.conditions import under_conditions
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.trials import command_sampler, evaluation_cfg, run_trial
+from mute.evaluation.usual_robots import under_conditions
 from mute.support.provenance import REPOSITORY, file_sha256, machine_kind
 from mute.support.ranges import Range
 

@@ -8,13 +8,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import torch
 import tyro
 
 from mute.acoustics.floors import FLOORS
-from mute.acoustics.gains import load_gains
 from mute.acoustics.origin import sound_origin
 from mute.command_lines.arguments import (
     Numbers,
@@ -31,10 +30,12 @@ from mute.command_lines.arguments import (
 from mute.command_lines.sound_options import (
     SoundArgs,
     find_microphone,
+    find_room,
     load_audible_policy,
     progress_bar,
     tell,
     tell_kept,
+    warn_if_not_known_well,
 )
 from mute.evaluation.noise_levels import SETTLE_TIME, NoiseRow, NoiseSetting, measure_noise
 from mute.evaluation.plotting import check_matplotlib
@@ -64,8 +65,10 @@ _Draw = Callable[[Sequence[NoiseRow], Path], list[Path]]
 
 @dataclass
 class _CommonArgs(SoundArgs):
-    trials: int = 5
+    trials: int = 32
     """Robots for each setting, side by side."""
+    nominal: bool = False
+    """Measure as many twins of the exact model, which see without noise, as well."""
     seconds: float = 10.0
     """Measured length of a trial, s."""
     seed: int = 1
@@ -79,7 +82,7 @@ class NoiseArgs(_CommonArgs):
     """Noise levels on several floors at one commanded speed: the paper's protocol, modelled."""
 
     surface: Words = ("wood", "carpet", "tile")
-    """Floors: wood, carpet, tile, concrete."""
+    """Floors: wood, parquet, laminate, carpet, tile, concrete."""
     beta: Numbers = (0.0, 1.0)
     """Quiet factors."""
     speed: float = 0.5
@@ -95,7 +98,7 @@ class SweepSpeedArgs(_CommonArgs):
     """Noise levels against the actual speed, as figures and data."""
 
     surface: str = "wood"
-    """Floor: wood, carpet, tile or concrete."""
+    """Floor: wood, parquet, laminate, carpet, tile or concrete."""
     beta: Numbers = (0.0, 1.0)
     """Quiet factors."""
     speed: Numbers = _SPEEDS
@@ -111,7 +114,7 @@ class SweepBetaArgs(_CommonArgs):
     """Noise levels and the squared tracking error against beta, as figures and data."""
 
     surface: str = "wood"
-    """Floor: wood, carpet, tile or concrete."""
+    """Floor: wood, parquet, laminate, carpet, tile or concrete."""
     beta: Numbers = _BETAS
     """Quiet factors."""
     speed: float = 0.8
@@ -179,6 +182,7 @@ def _run(
     _check(args, surfaces, args.beta, speeds)
     check_wav(args.wav)
     check_video(args.video)
+    args.check_sound(args.wav or args.video)
     _check_films(args.video, len(args.beta) * len(speeds))
     settings = [NoiseSetting(beta, speed) for beta in args.beta for speed in speeds]
     kept = [
@@ -187,8 +191,14 @@ def _run(
     ]
     args = args.with_policy_found()
     origin = sound_origin(args.policy)
-    rows = _measure(name, args, surfaces, settings, kept)
-    _report(name, args, rows, origin, draw)
+    rows: list[NoiseRow] = []
+    try:
+        _measure(name, args, surfaces, settings, kept, rows)
+    except KeyboardInterrupt:
+        if rows:  # of the floors that are done
+            _report(name, args, rows, origin | {"stopped": True}, None)
+        raise
+    _report(name, args, rows, origin | {"stopped": False}, draw)
     tell_kept(kept)
 
 
@@ -198,8 +208,9 @@ def _measure(
     surfaces: Sequence[str],
     settings: Sequence[NoiseSetting],
     kept: Sequence[KeptWalks],
-) -> list[NoiseRow]:
-    """Return the rows of every setting on every floor.
+    rows: list[NoiseRow],
+) -> None:
+    """Measure every setting on every floor.
 
     Args:
         name: What is measured.
@@ -207,16 +218,17 @@ def _measure(
         surfaces: Names of the floors.
         settings: What is asked for on each.
         kept: For each floor what to keep of settings, by their index.
+        rows: Is given the rows of each floor.
     """
-    policy, gains = load_audible_policy(args.policy), load_gains()
-    microphone = find_microphone(args.microphone)
+    policy = load_audible_policy(args.policy)
+    microphone, room = find_microphone(args.microphone), find_room(args.room)
     make_directory(args.out)
     torch.set_num_threads(1)  # the physics engine has the cores
     steps = round((args.seconds + SETTLE_TIME) / policy.cfg.env.step_dt)
-    rows: list[NoiseRow] = []
+    who = (False, True) if args.nominal else (False,)
     done = itertools.count(1)
-    with progress_bar(name, len(surfaces) * steps) as advance:
-        for surface, keep in zip(surfaces, kept, strict=True):
+    with progress_bar(name, len(who) * len(surfaces) * steps) as advance:
+        for (surface, keep), nominal in itertools.product(zip(surfaces, kept, strict=True), who):
             rows += measure_noise(
                 policy,
                 surface,
@@ -224,13 +236,14 @@ def _measure(
                 args.trials,
                 args.seconds,
                 args.seed,
-                gains,
-                keep,
+                KeptWalks() if nominal else keep,
                 on_step=lambda: advance(next(done)),
                 microphone=microphone,
                 sources=args.sources,
+                from_energies=room.has_walls,
+                nominal=nominal,
+                room=room,
             )
-    return rows
 
 
 def _files(path: Path | None, labels: Sequence[Sequence[str]]) -> list[dict[int, Path]]:
@@ -257,7 +270,7 @@ def _report(
     name: str,
     args: _CommonArgs,
     rows: Sequence[NoiseRow],
-    origin: Mapping[str, str],
+    origin: Mapping[str, Any],
     draw: _Draw | None = None,
 ) -> None:
     """Print and write the rows, then draw them, so that no figure can cost the data."""
@@ -273,18 +286,30 @@ def _report(
         "seed": args.seed,
         "sources": args.sources,
         "microphone": args.microphone,
+        "room": args.room,
     }
     write_json(args.out / f"{name}_about.json", about)
-    figures = draw(rows, args.out) if draw else []
+    usual = [row for row in rows if row.robots == "different"]
+    _warn_of_few(usual)
+    figures = draw(usual, args.out) if draw else []
     data = [f"{name}.json", f"{name}.csv", f"{name}_about.json"]
     names = [*data, *(path.name for path in figures)]
     print(f"written to {args.out}: {', '.join(names)}")
 
 
+def _warn_of_few(rows: Sequence[NoiseRow]) -> None:
+    """Say where so few robots walked that a mean level is not known well."""
+    warn_if_not_known_well(max((row.mnl_ci95 for row in rows), default=0.0, key=_or_zero))
+
+
+def _or_zero(value: float) -> float:
+    return value if math.isfinite(value) else 0.0
+
+
 def _shown(row: NoiseRow) -> dict[str, str]:
     """Return a row as a terminal of 100 columns can show it; the files have every figure."""
     return {
-        "floor": row.surface,
+        "floor": row.surface + ("" if row.robots == "different" else ", exact"),
         "beta": f"{row.beta:g}",
         "MNL": _with_spread(row.mnl_mean, row.mnl_std),
         "PNL": _with_spread(row.pnl_mean, row.pnl_std),
@@ -300,7 +325,7 @@ def _shown(row: NoiseRow) -> dict[str, str]:
 
 
 def _with_spread(mean: float, deviation: float) -> str:
-    """Return a level and its standard deviation, which a single trial does not have."""
+    """Return a level and its standard deviation over robots, which a single one does not have."""
     return f"{mean:.1f}" if math.isnan(deviation) else f"{mean:.1f}±{deviation:.1f}"
 
 
@@ -315,7 +340,6 @@ def _check(
     check_trials(args.trials, args.seconds)
     check_seed(args.seed)
     check_betas(betas)
-    args.check_sound()
     for option, values in (("surface", surfaces), ("beta", betas), ("speed", speeds)):
         check_distinct(option, values)
     for surface in surfaces:

@@ -24,10 +24,10 @@ from mute.command_lines.policy_options import PolicyArgs
 from mute.command_lines.sound_options import load_audible_policy, progress_bar
 from mute.controllers import load_policy
 from mute.controllers.learned import Policy
-from mute.evaluation.reliability.conditions import under_conditions
 from mute.evaluation.reliability.figures import Figure, PartResult, shown
 from mute.evaluation.reliability.parts import PARTS
 from mute.evaluation.tables import print_table, write_csv, write_json
+from mute.evaluation.usual_robots import under_conditions
 from mute.support.errors import MuteError
 from mute.support.plain_data import without_nan
 from mute.support.signals import exit_status

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import torch
 
-from mute.acoustics.gains import load_gains
 from mute.acoustics.origin import sound_origin
 from mute.command_lines.arguments import (
     check_betas,
+    check_option,
     check_seed,
     check_video,
     check_wav,
@@ -22,21 +24,29 @@ from mute.command_lines.arguments import (
 from mute.command_lines.sound_options import (
     SoundArgs,
     find_microphone,
+    find_room,
     load_audible_policy,
     progress_bar,
     tell,
     tell_kept,
+    warn_if_not_known_well,
 )
 from mute.controllers import LearnedController
+from mute.controllers.learned import Policy
 from mute.evaluation.course.course import Course, load_course
 from mute.evaluation.course.long_walk import Walk, follow_course, make_walk_env
+from mute.evaluation.intervals import mean_with_interval
 from mute.evaluation.plotting import check_matplotlib
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.rendering.kept_walks import KeptWalks
 from mute.support.provenance import REPOSITORY
+from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
 
 __all__ = ["WalkArgs", "walk"]
+
+
+_MOST_TRIALS = 1000
 
 
 @dataclass
@@ -50,8 +60,12 @@ class WalkArgs(SoundArgs):
     hold_speed: bool = False
     """Command more than the course's speed where the robot falls behind it, as quiet ones do, so
     that different betas walk equally fast; unless given, the command is the course's speed."""
+    trials: int = 16
+    """Robots that walk it, one after the other; the first is drawn and kept."""
+    nominal: bool = False
+    """Let the exact model, which sees without noise, walk it as well."""
     seed: int = 1
-    """Seed of the initial state and of the noise."""
+    """Seed of the first robot, of its initial state and of the noise; those after it count on."""
     out: Path = Path("evaluation")
     """Directory of the files that are written."""
     wav: Path | None = None
@@ -68,37 +82,117 @@ def walk(args: WalkArgs) -> None:
     """
     check_betas([args.beta])
     check_seed(args.seed)
-    args.check_sound()
+    check_option("trials", args.trials, Range(1, _MOST_TRIALS, whole=True))
     check_wav(args.wav)
     check_video(args.video)
+    args.check_sound(args.wav or args.video)
     args = args.with_policy_found()
     check_matplotlib()
-    microphone = find_microphone(args.microphone)
     course, policy = load_course(args.course), load_audible_policy(args.policy)
-    gains = load_gains()
     make_directory(args.out)  # now: a walk is long, and must not be in vain
     torch.set_num_threads(1)
     origin = sound_origin(args.policy)
-    env = make_walk_env(policy.cfg.env, course, args.seed)
     keep = _kept_walk(args)
-    with progress_bar("walk", course.length) as advance:
-        result = follow_course(
-            env,
-            LearnedController(policy, env.num_envs),
-            course,
-            args.beta,
-            gains,
-            args.seed,
-            args.hold_speed,
-            keep,
-            advance,
-            microphone=microphone,
-            sources=args.sources,
-        )
-    print(_story(result, course))
-    files = _write(args, course, result, {"iteration": policy.iteration} | origin)
-    print(f"written to {args.out}: {', '.join(files)}")
+    walked: list[Walk] = []
+    exact: list[Walk] = []
+    try:
+        _walk_all(args, course, policy, keep, walked, exact)
+    except KeyboardInterrupt:
+        if walked:
+            _report(args, course, walked, exact, {"iteration": policy.iteration} | origin, True)
+            tell_kept([keep])
+        raise
+    _report(args, course, walked, exact, {"iteration": policy.iteration} | origin, False)
     tell_kept([keep])
+
+
+def _walk_all(
+    args: WalkArgs,
+    course: Course,
+    policy: Policy,
+    keep: KeptWalks,
+    walked: list[Walk],
+    exact: list[Walk],
+) -> None:
+    """Let one robot after the other walk, and then the exact one if it is to.
+
+    Args:
+        args: What was asked for.
+        course: Where they walk.
+        policy: What walks.
+        keep: What to keep of the first.
+        walked: Is given what came of each.
+        exact: Is given what came of the exact one.
+    """
+    microphone, room = find_microphone(args.microphone), find_room(args.room)
+    cases = [(args.seed + trial, False) for trial in range(args.trials)]
+    cases += [(args.seed, True)] if args.nominal else []
+    with progress_bar("walk", len(cases) * course.length) as advance:
+        for index, (seed, nominal) in enumerate(cases):
+            env = make_walk_env(policy, course, seed, nominal)
+            before = index * course.length
+            result = follow_course(
+                env,
+                LearnedController(policy, env.num_envs),
+                course,
+                args.beta,
+                seed,
+                args.hold_speed,
+                KeptWalks() if index else keep,
+                lambda done, before=before: advance(before + done),
+                microphone=microphone,
+                sources=args.sources,
+                from_energies=room.has_walls,
+                room=room,
+            )
+            (exact if nominal else walked).append(result)
+
+
+def _report(
+    args: WalkArgs,
+    course: Course,
+    walked: Sequence[Walk],
+    exact: Sequence[Walk],
+    origin: Mapping[str, str | int],
+    stopped: bool,
+) -> None:
+    """Print what came of the walks, and write it.
+
+    Args:
+        args: What was asked for.
+        course: Where they walked.
+        walked: Of robots as they are.
+        exact: Of the exact model, if it walked.
+        origin: What the levels rest on.
+        stopped: Whether that was before all had walked.
+    """
+    print(_story(walked[0], course))
+    over = _over_all(walked) | {"stopped": stopped}
+    if len(walked) > 1:
+        mnl, pnl = (_with_interval(over, name) for name in ("mnl", "pnl"))
+        warn_if_not_known_well(over["mnl_ci95"])
+        print(f"{over['arrived']} of {len(walked)} arrived: MNL {mnl}, PNL {pnl} dBA, modelled")
+    over["nominal"] = [one.figures() for one in exact]
+    over["others"] = [one.figures() for one in walked[1:]]
+    files = _write(args, course, walked[0], origin, over)
+    print(f"written to {args.out}: {', '.join(files)}")
+
+
+def _over_all(walked: Sequence[Walk]) -> dict[str, Any]:
+    """Return the levels over the robots that arrived."""
+    arrived = [one for one in walked if one.end == "arrived"]
+    over: dict[str, Any] = {"trials": len(walked), "arrived": len(arrived)}
+    for name in ("mnl", "pnl"):
+        levels = [getattr(one, name) for one in arrived]
+        heard = [level for level in levels if math.isfinite(level)]
+        mean, deviation, half_width = mean_with_interval(heard)
+        over |= {f"{name}_mean": mean, f"{name}_std": deviation, f"{name}_ci95": half_width}
+    return over
+
+
+def _with_interval(over: Mapping[str, Any], name: str) -> str:
+    mean, half_width = over[f"{name}_mean"], over[f"{name}_ci95"]
+    return f"{mean:.1f}" if math.isnan(half_width) else f"{mean:.1f} ± {half_width:.1f}"
 
 
 def _kept_walk(args: WalkArgs) -> KeptWalks:
@@ -107,8 +201,13 @@ def _kept_walk(args: WalkArgs) -> KeptWalks:
 
 
 def _write(
-    args: WalkArgs, course: Course, result: Walk, origin: Mapping[str, str | int]
+    args: WalkArgs,
+    course: Course,
+    result: Walk,
+    origin: Mapping[str, str | int],
+    over: Mapping[str, Any],
 ) -> list[str]:
+    """Write the figures, and the track and the map of the first robot; return the files."""
     about = {
         "course": os.path.relpath(args.course, REPOSITORY),
         **origin,
@@ -118,8 +217,9 @@ def _write(
         "seed": args.seed,
         "sources": args.sources,
         "microphone": args.microphone,
+        "room": args.room,
     }
-    write_json(args.out / "walk.json", about | result.figures())
+    write_json(args.out / "walk.json", about | result.figures() | dict(over))
     files = ["walk.json"]
     rows = result.track.rows()
     if len(rows) < 2:

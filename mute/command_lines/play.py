@@ -15,7 +15,6 @@ from typing import Literal
 from mute.acoustics.audible_env import audible_cfg
 from mute.acoustics.files.writing import has_samples
 from mute.acoustics.floors import FLOORS
-from mute.acoustics.gains import load_gains
 from mute.acoustics.live_listener import LiveListener
 from mute.acoustics.soundscape import SOURCES
 from mute.command_lines.arguments import (
@@ -95,9 +94,9 @@ class PlayArgs(PolicyArgs):
     it), with the command half a second later; moving, near the stance with a little speed in any
     direction, as in training."""
     surface: str | None = None
-    """Floor to walk on and to hear, with physics at 1 ms: wood, carpet, tile or concrete. Unless
-    given, training's floor and physics, with a level (modelled, sounding as wood); with --wav or
-    --video, wood."""
+    """Floor to walk on and to hear, with physics at 1 ms: wood, parquet, laminate, carpet,
+    tile or concrete. Unless given, training's floor and physics, with a level (modelled, sounding
+    as wood); with --wav or --video, wood."""
     sources: Sources = SOURCES
     microphone: MicrophonePlace = "trunk"
     wav: Path | None = None
@@ -263,7 +262,6 @@ def _make_listener(args: PlayArgs, env: QuadrupedEnv, settle_time: float) -> Liv
     return LiveListener(
         env,
         surface,
-        load_gains(),
         settle_time,
         args.seed,
         args.sound,

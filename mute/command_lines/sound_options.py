@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,26 +17,32 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from mute.acoustics import soundscape
 from mute.acoustics.audible_env import listening_cfg
 from mute.acoustics.microphone import Microphone
+from mute.acoustics.physics.room import ROOMS, Room
+from mute.acoustics.room_sound import check_rooms_heard
 from mute.command_lines.arguments import Words, check_distinct
 from mute.command_lines.policy_options import PolicyArgs
 from mute.controllers import load_policy
 from mute.controllers.learned import Policy
 from mute.rendering.kept_walks import KeptWalks
 from mute.support.errors import MuteError
+from mute.support.ranges import Range
 
 __all__ = [
     "MicrophonePlace",
+    "RoomName",
     "SoundArgs",
     "Sources",
     "check_sources",
     "find_microphone",
+    "find_room",
     "load_audible_policy",
     "progress_bar",
     "tell",
     "tell_kept",
+    "warn_if_not_known_well",
 ]
 
-Sources = Annotated[Words, tyro.conf.arg(help="What to hear: impacts, scuffing, drive, fan.")]
+Sources = Annotated[Words, tyro.conf.arg(help="What to hear: impacts, body, drive, scuffing, fan.")]
 """Type of the option --sources."""
 
 MicrophonePlace = Annotated[
@@ -50,22 +57,41 @@ MicrophonePlace = Annotated[
 """Type of the option --microphone."""
 
 
+RoomName = Annotated[
+    str,
+    tyro.conf.arg(
+        help="Where that is: open, office, corridor, ward, or V,A: a volume in m3 and an "
+        "absorption area in m2, as 60,10. Walls add to the levels, which come from energies then."
+    ),
+]
+"""Type of the option --room."""
+
+
 @dataclass
 class SoundArgs(PolicyArgs):
     """The arguments of every evaluation of what a policy sounds like."""
 
     sources: Sources = soundscape.SOURCES
     microphone: MicrophonePlace = "trunk"
+    room: RoomName = "open"
 
-    def check_sound(self) -> None:
-        """Check --sources and --microphone.
+    def check_sound(self, kept: Path | None = None) -> None:
+        """Check --sources, --microphone and --room.
+
+        Args:
+            kept: File that sound is to be kept in, if any.
 
         Raises:
-            MuteError: If one is bad.
+            MuteError: If one is bad, or sound of a room is to be kept and what makes it is missing.
         """
         check_sources(self.sources)
         find_microphone(self.microphone)
+        if find_room(self.room).has_walls and kept is not None:
+            check_rooms_heard()
 
+
+_KNOWN_WELL = 0.3
+"""Half width of a 95 % interval that a mean level should be known within, dB."""
 
 _FARTHEST = 100.0
 """Largest coordinate of a microphone, m."""
@@ -113,6 +139,56 @@ def find_microphone(text: str) -> Microphone:
     return Microphone((x, y, z), "beside" if place == text else "world")
 
 
+_VOLUMES = Range(1.0, 1e6)
+_ABSORPTIONS = Range(0.1, 1e6)
+_FLAT_ROOM = 2.5
+"""Height of a room that is given by its volume, m, unless it is smaller than a cube of that."""
+_LENGTH_TO_WIDTH = 1.25
+_LONGEST_REVERBERATION = 10.0
+"""s; cathedrals have less."""
+
+
+def find_room(text: str) -> Room:
+    """Return the room that --room names.
+
+    Args:
+        text: A name of `ROOMS`, or `V,A`: volume, m^3, and absorption area, m^2.
+
+    Raises:
+        MuteError: If it is neither, or out of range.
+    """
+    if text in ROOMS:
+        return ROOMS[text]
+    try:
+        volume, absorption = (float(part) for part in text.split(","))
+    except ValueError:
+        raise MuteError(
+            f"--room must be one of {', '.join(ROOMS)}, or V,A in m3 and m2, got {text!r}"
+        ) from None
+    for name, value, allowed in (
+        ("volume", volume, _VOLUMES),
+        ("absorption area", absorption, _ABSORPTIONS),
+    ):
+        if not allowed.holds(value):
+            raise MuteError(f"--room: the {name} must be {allowed}, got {text!r}")
+    height = min(_FLAT_ROOM, volume ** (1.0 / 3.0))
+    width = math.sqrt(volume / height / _LENGTH_TO_WIDTH)
+    length = _LENGTH_TO_WIDTH * width
+    room = Room(absorption, (length, width, height))
+    surface = 2.0 * (length * width + length * height + width * height)
+    if absorption >= surface:
+        raise MuteError(
+            f"--room: the absorption area must be below the {surface:.0f} m2 of walls, floor and "
+            f"ceiling, got {text!r}"
+        )
+    if room.reverberation_time > _LONGEST_REVERBERATION:
+        raise MuteError(
+            f"--room: the reverberation time must be <= {_LONGEST_REVERBERATION:g} s, and is "
+            f"{room.reverberation_time:.3g} s of {text!r}"
+        )
+    return room
+
+
 def load_audible_policy(path: Path) -> Policy:
     """Return a policy that can be heard.
 
@@ -147,6 +223,19 @@ def progress_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
 def tell(note: str) -> None:
     """Print a line on standard error."""
     print(note, file=sys.stderr)
+
+
+def warn_if_not_known_well(half_width: float) -> None:
+    """Say where so few robots walked that a mean level is not known well.
+
+    Args:
+        half_width: Of the 95 % interval of an MNL, dB; NaN, of a single robot, is let be.
+    """
+    if half_width > _KNOWN_WELL:
+        tell(
+            f"the 95 % interval of an MNL is up to ±{half_width:.1f} dB; more --trials make it "
+            "narrower"
+        )
 
 
 def tell_kept(kept: Iterable[KeptWalks]) -> None:

@@ -1,4 +1,4 @@
-"""How far a median can be trusted."""
+"""How far a mean or a median can be trusted."""
 
 from __future__ import annotations
 
@@ -7,12 +7,29 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scipy.stats import quantile_test
+from scipy.stats import quantile_test, t
 
-__all__ = ["LEVEL", "MedianInterval", "median_interval"]
+__all__ = ["LEVEL", "MedianInterval", "mean_with_interval", "median_interval"]
 
 LEVEL = 0.95
 """Confidence level of an interval."""
+
+
+def mean_with_interval(values: Sequence[float]) -> tuple[float, float, float]:
+    """Return mean, standard deviation and half width of the mean's interval (Student's t).
+
+    Of one value the last two are NaN, of none all three.
+
+    Args:
+        values: Any number of them.
+    """
+    count = len(values)
+    if count < 2:
+        return values[0] if values else math.nan, math.nan, math.nan
+    mean = statistics.fmean(values)
+    deviation = math.sqrt(sum((value - mean) ** 2 for value in values) / (count - 1))
+    half_width = float(t.ppf(0.5 + 0.5 * LEVEL, count - 1)) * deviation / count**0.5
+    return mean, deviation, half_width
 
 
 @dataclass(frozen=True)

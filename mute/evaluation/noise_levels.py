@@ -1,28 +1,31 @@
 """How loud a policy walks: the paper's protocol, with all trials side by side.
 
-Every level here is modelled (`mute.acoustics`), not measured.
+The robots are as robots are: each a little different, seeing with noise (`usual_robots`). Every
+level here is modelled (`mute.acoustics`), not measured.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
 import torch
-from scipy import stats
 
 from mute.acoustics.audible_env import make_listening_env
 from mute.acoustics.listener import Listener
 from mute.acoustics.microphone import Microphone
+from mute.acoustics.physics.room import OPEN, Room
 from mute.acoustics.soundscape import SOURCES
 from mute.acoustics.tally import HeardLevels
 from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.gait import Gait
-from mute.evaluation.trials import evaluation_cfg, run_trial
+from mute.evaluation.intervals import mean_with_interval
+from mute.evaluation.trials import run_trial
+from mute.evaluation.usual_robots import robots_cfg
 from mute.rendering.kept_walks import KeptWalks, filming
 
 __all__ = [
@@ -57,6 +60,9 @@ class NoiseRow:
     """Quiet factor."""
     surface: str
     """Name of the floor."""
+    robots: str
+    """`different`: robots as they are, each with its own physics, that see with noise; `nominal`:
+    the exact model, without noise."""
     command_speed: float
     """Commanded forward speed, m/s."""
     trials: int
@@ -78,7 +84,10 @@ class NoiseRow:
     laeq_mean: float
     """Mean over trials of the equivalent continuous level, dBA."""
     laeq_impacts: float
-    """Level of the impacts' mean energy over trials; -inf if they are silent, NaN if not heard."""
+    """Level of the mean energy over trials of the struck floor; -inf if it is silent, NaN if not
+    heard."""
+    laeq_body: float
+    """The same of the robot's shell, which landings shake."""
     laeq_scuffing: float
     """The same of scuffing."""
     laeq_drive: float
@@ -114,13 +123,13 @@ def measure_noise(
     trials: int,
     seconds: float,
     seed: int,
-    gains: Mapping[str, float],
     keep: KeptWalks | None = None,
     microphone: Microphone | None = None,
     sources: Sequence[str] = SOURCES,
     from_energies: bool = False,
     on_step: Callable[[], None] | None = None,
-    randomized: bool = False,
+    nominal: bool = False,
+    room: Room = OPEN,
 ) -> list[NoiseRow]:
     """Walk straight ahead on a floor and return each setting's figures.
 
@@ -130,10 +139,10 @@ def measure_noise(
         policy: What walks.
         surface: Name of the floor.
         settings: What is asked for; their trials walk side by side, in one batch.
-        trials: Robots for each setting, which differ in their initial state and in their noise.
+        trials: Robots for each setting, which differ in their physics, their initial state and
+            their noise.
         seconds: Measured length of a trial, after `SETTLE_TIME`, s.
         seed: Seed of initial states and of the noise.
-        gains: Calibration gain of each floor.
         keep: What to keep of each setting's first trial, by the setting's index, from
             `SETTLE_TIME` on.
         microphone: Where to listen. Default: on the trunk.
@@ -142,14 +151,16 @@ def measure_noise(
             `mute.acoustics.energy`.
         on_step: Called after each control step, of which there are `(seconds + SETTLE_TIME) /
             step_dt`.
-        randomized: Keep the training's randomised physics, pushes and sensor noise.
+        nominal: Let all be the exact model, which sees without noise; they differ in their initial
+            state alone.
+        room: Where it is heard. Sound of one with walls needs pyroomacoustics.
 
     Raises:
-        MuteError: If a file cannot be written, or nothing renders.
+        MuteError: If a file cannot be written, nothing renders, or what a room needs is missing.
         ValueError: If the floor or a source is not known.
     """
     robots = len(settings) * trials
-    cfg = evaluation_cfg(policy.cfg.env, robots, seconds + SETTLE_TIME, seed, randomized)
+    cfg = robots_cfg(policy, robots, seconds + SETTLE_TIME, seed, nominal)
     env = make_listening_env(cfg, surface)
     commands = torch.zeros(robots, 4)
     for index, setting in enumerate(settings):
@@ -163,12 +174,12 @@ def measure_noise(
             env,
             [surface],
             microphone=microphone,
-            gains=gains,
             sources=sources,
             settle_time=SETTLE_TIME,
             seed=seed,
             wav=films.sounds,
             from_energies=from_energies,
+            room=room,
         ) as listener,
     ):
 
@@ -182,12 +193,13 @@ def measure_noise(
     kept.note_clipped(listener.clipped)
     levels = listener.levels()
     weight = robot_weight(env)
+    who = "nominal" if nominal else "different"
     rows = []
     for index, setting in enumerate(settings):
         chosen = torch.zeros(robots, dtype=torch.bool)
         chosen[index * trials : (index + 1) * trials] = True
         own = levels[index * trials : (index + 1) * trials]
-        rows.append(_row(policy.task, surface, setting, meter.gait(chosen), own, weight))
+        rows.append(_row((policy.task, surface, who), setting, meter.gait(chosen), own, weight))
     return rows
 
 
@@ -197,23 +209,23 @@ def robot_weight(env: QuadrupedEnv) -> float:
 
 
 def _row(
-    method: str,
-    surface: str,
+    case: tuple[str, str, str],
     setting: NoiseSetting,
     gait: Gait,
     levels: Sequence[HeardLevels],
     weight: float,
 ) -> NoiseRow:
     heard = [trial for trial in levels if math.isfinite(trial.mnl)]
-    mnl, mnl_std, mnl_ci95 = _spread([trial.mnl for trial in heard])
-    pnl, pnl_std, pnl_ci95 = _spread([trial.pnl for trial in heard])
+    mnl, mnl_std, mnl_ci95 = mean_with_interval([trial.mnl for trial in heard])
+    pnl, pnl_std, pnl_ci95 = mean_with_interval([trial.pnl for trial in heard])
     power = _mean_power(levels)
     own = asdict(gait) | {"power": power}
     shared = {name: own[name] for name in NoiseRow.__dataclass_fields__ if name in own}
     return NoiseRow(
-        method=method,
+        method=case[0],
         beta=setting.beta,
-        surface=surface,
+        surface=case[1],
+        robots=case[2],
         command_speed=setting.command_speed,
         trials=len(levels),
         trials_heard=len(heard),
@@ -223,7 +235,7 @@ def _row(
         pnl_mean=pnl,
         pnl_std=pnl_std,
         pnl_ci95=pnl_ci95,
-        laeq_mean=_spread([trial.laeq for trial in heard])[0],
+        laeq_mean=mean_with_interval([trial.laeq for trial in heard])[0],
         **{
             f"laeq_{name}": _mean_energy([trial.sources.get(name, math.nan) for trial in levels])
             for name in SOURCES
@@ -249,13 +261,3 @@ def _mean_energy(values: Sequence[float]) -> float:
         return math.nan
     mean = sum(known) / len(known)
     return 10.0 * math.log10(mean) if mean > 0.0 else -math.inf
-
-
-def _spread(values: Sequence[float]) -> tuple[float, float, float]:
-    """Return mean, standard deviation and half width of the mean's 95 % confidence interval."""
-    count = len(values)
-    if count < 2:
-        return values[0] if values else math.nan, math.nan, math.nan
-    deviation = float(np.std(values, ddof=1))
-    half_width = float(stats.t.ppf(0.975, count - 1)) * deviation / count**0.5
-    return float(np.mean(values)), deviation, half_width

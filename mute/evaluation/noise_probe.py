@@ -8,13 +8,11 @@ their levels come from the energies of all sources, without audio. So these curv
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import Any
 
 import torch
 
 from mute.acoustics.audible_env import listening_cfg
-from mute.acoustics.gains import load_gains
 from mute.controllers.learned import Policy, make_policy
 from mute.evaluation.noise_levels import NoiseSetting, measure_noise
 from mute.support.precision import full_precision
@@ -31,11 +29,6 @@ _SEED = 1
 
 class NoiseProbe:
     """Measures the modelled level of a policy at beta 0 and 1, quickly."""
-
-    @cached_property
-    def _gains(self) -> dict[str, float]:
-        """The calibration: read once, and only where levels are measured."""
-        return load_gains()
 
     def __call__(self, saved: dict[str, Any]) -> dict[str, float]:
         """Return the mean noise levels at the microphone on the trunk by curve, dBA.
@@ -69,7 +62,6 @@ class NoiseProbe:
                 _TRIALS,
                 _SECONDS,
                 _SEED,
-                self._gains,
                 from_energies=True,
             )
         levels = {f"Noise/level_beta_{row.beta:g}": row.mnl_mean for row in rows}

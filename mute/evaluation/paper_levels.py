@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["PAPER_LEVELS", "PAPER_MNL_AT_08", "PAPER_WALK"]
+__all__ = ["PAPER_AT_08", "PAPER_LEVELS", "PAPER_WALK"]
 
 PAPER_LEVELS: dict[str, dict[str, tuple[float, float]]] = {
     "dreamwaq": {"wood": (73.51, 83.18), "carpet": (71.90, 80.80), "tile": (72.34, 80.93)},
@@ -12,8 +12,10 @@ PAPER_LEVELS: dict[str, dict[str, tuple[float, float]]] = {
 }
 """(MNL, PNL) at 0.5 m/s by method and floor: the paper's table of noise levels."""
 
-PAPER_MNL_AT_08: dict[float, float] = {0.0: 77.85, 1.0: 73.18}
-"""MNL by beta on wood, asked for 0.8 m/s: the paper's analysis of the quiet factor."""
+PAPER_AT_08: dict[float, float] = {0.0: 77.85, 1.0: 73.18}
+"""Levels by beta on wood, asked for 0.8 m/s: the paper's analysis of the quiet factor.
+
+It does not say for certain whether they are means or peaks."""
 
 PAPER_WALK: dict[str, float] = {"seconds": 256.0, "mnl": 68.25, "pnl": 76.8}
 """The paper's long walk over mixed floors."""

@@ -81,7 +81,7 @@ def as_modelled() -> RandomizationCfg:
     Dry friction is the one figure that the model has joint by joint; whoever uses this sets it.
     """
     return RandomizationCfg(
-        friction=(0.8, 0.8),
+        friction_factor=(1.0, 1.0),
         added_mass=(0.0, 0.0),
         com_offset=(0.0, 0.0),
         gain_scale=(1.0, 1.0),

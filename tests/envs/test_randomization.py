@@ -9,7 +9,7 @@ import torch
 
 from mute.envs.batch_simulation import BatchSimulation
 from mute.envs.randomization import PHYSICS_DIM, RandomizationCfg, randomize_physics
-from mute.envs.scene import SceneCfg, build_scene
+from mute.envs.scene import FloorPatch, SceneCfg, build_scene
 
 MODEL = build_scene(SceneCfg())
 TRUNK = MODEL.body("trunk").id
@@ -43,11 +43,24 @@ def _assert_within(values, low, high):
     assert values.unique().numel() == values.numel()
 
 
-def test_every_robot_draws_its_own_friction_for_all_its_contacts():
-    simulation, _ = _randomize(friction=(0.3, 0.9))
-    friction = simulation.field("geom_friction")[:, :, 0]
-    assert torch.equal(friction, friction[:, :1].expand_as(friction))
-    _assert_within(friction[:, 0], 0.3, 0.9)
+def test_every_robot_draws_one_factor_on_the_friction_of_all_there_is():
+    simulation, _ = _randomize(friction_factor=(0.3, 0.9))
+    factor = simulation.field("geom_friction")[:, :, 0].double() / _of_model("geom_friction")[:, 0]
+    torch.testing.assert_close(factor, factor[:, :1].expand_as(factor))
+    _assert_within(factor[:, 0], 0.3, 0.9)
+
+
+def test_floors_side_by_side_keep_what_they_differ_by():
+    slippery = FloorPatch((-3.0, -3.0), (3.0, 3.0), 0.2, (0.02, 1.0))
+    rough = FloorPatch((3.0, -3.0), (9.0, 3.0), 0.9, (0.02, 1.0))
+    model = build_scene(SceneCfg(floor_patches=(slippery, rough)))
+    simulation = BatchSimulation(model, NUM_ENVS, num_threads=1)
+    cfg = RandomizationCfg(friction_factor=(0.5, 1.5))
+    randomize_physics(simulation, cfg, torch.Generator().manual_seed(0))
+    patches = [geom for geom in range(model.ngeom) if model.geom_bodyid[geom] == 0][-2:]
+    friction = simulation.field("geom_friction")[:, patches, 0].double()
+    _assert_within(friction[:, 0], 0.1, 0.3)
+    torch.testing.assert_close(friction[:, 1], 4.5 * friction[:, 0])
 
 
 def test_mass_is_added_to_the_trunk_alone_and_its_inertia_grows_alike():
@@ -88,13 +101,14 @@ def test_dry_friction_brakes_the_joints_and_not_the_trunk():
 
 def test_what_the_critic_knows_is_the_draw_scaled_to_one():
     simulation, known = _randomize(
-        friction=(0.4, 1.2), added_mass=(-1.0, 1.0), com_offset=(-0.02, 0.02)
+        friction_factor=(0.5, 1.5), added_mass=(-1.0, 1.0), com_offset=(-0.02, 0.02)
     )
-    friction = simulation.field("geom_friction")[:, 0, 0].double()
+    floor = MODEL.geom("floor").id
+    factor = simulation.field("geom_friction")[:, floor, 0].double() / 0.8
     added = simulation.field("body_mass")[:, TRUNK].double() - _of_model("body_mass")[TRUNK]
     offset = simulation.field("body_ipos")[:, TRUNK].double() - _of_model("body_ipos")[TRUNK]
     expected = torch.cat(
-        (((friction - 0.8) / 0.4).unsqueeze(1), added.unsqueeze(1), offset / 0.02), dim=1
+        ((2.0 * (factor - 1.0)).unsqueeze(1), added.unsqueeze(1), offset / 0.02), dim=1
     )
     assert known.shape == (NUM_ENVS, PHYSICS_DIM)
     assert known.dtype == torch.float32
@@ -120,9 +134,9 @@ def test_a_heavier_robot_weighs_more():
 
 
 def test_an_empty_range_gives_the_value_itself_and_tells_the_critic_nothing():
-    simulation, known = _randomize(friction=(0.7, 0.7), added_mass=(0, 0), com_offset=(0, 0))
+    simulation, known = _randomize(friction_factor=(0.7, 0.7), added_mass=(0, 0), com_offset=(0, 0))
     friction = simulation.field("geom_friction")[:, :, 0].double()
-    torch.testing.assert_close(friction, torch.full_like(friction, 0.7))
+    torch.testing.assert_close(friction[0], 0.7 * _of_model("geom_friction")[:, 0])
     assert (known == 0.0).all()
 
 
@@ -146,13 +160,13 @@ def test_the_seed_decides_the_physics():
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("friction", (1.0, 0.5)),
-        ("friction", (-0.1, 0.5)),
+        ("friction_factor", (1.0, 0.5)),
+        ("friction_factor", (-0.1, 0.5)),
         ("added_mass", (1.0, 0.0)),
         ("com_offset", (0.1, -0.1)),
         ("gain_scale", (-1.0, 1.0)),
         ("friction_loss", (-0.1, 0.1)),
-        ("friction", (0.5, math.inf)),
+        ("friction_factor", (0.5, math.inf)),
         ("com_offset", (math.nan, 0.0)),
         ("added_mass", (-math.inf, 0.0)),
         ("added_mass", (-5.204, 0.0)),

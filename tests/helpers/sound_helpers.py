@@ -16,8 +16,8 @@ def make_block(
     timestep=0.001,
     landings=(),
     friction_power: ArrayLike = 0.0,
-    joint_power=0.0,
-    joint_speed=0.0,
+    joint_torque: ArrayLike = 0.0,
+    joint_vel: ArrayLike = 0.0,
     floor=0,
 ):
     """Make a robot that stands at the origin; landings are (step, robot, foot, speed, mass)."""
@@ -33,6 +33,7 @@ def make_block(
         position=FEET[foot],
     )
     per_foot = np.broadcast_to(friction_power, (steps, robots, 4))
+    speed = np.broadcast_to(joint_vel, (steps, robots, 12))
     return ContactBlock(
         start=0.0,
         timestep=timestep,
@@ -40,15 +41,16 @@ def make_block(
         friction_power=per_foot,
         foot_pos=np.broadcast_to(FEET, (steps, robots, 4, 3)),
         floor=np.full((steps, robots, 4), floor),
-        joint_power=np.full((steps, robots, 12), joint_power),
-        joint_speed=np.full((steps, robots, 12), joint_speed),
+        joint_pos=timestep * (np.cumsum(speed, axis=0) - speed[:1]),
+        joint_vel=speed,
+        joint_torque=np.broadcast_to(joint_torque, (steps, robots, 12)),
         trunk_pos=np.broadcast_to([0.0, 0.0, 0.3], (steps, robots, 3)),
         trunk_quat=np.broadcast_to([1.0, 0.0, 0.0, 0.0], (steps, robots, 4)),
     )
 
 
 def random_walk(seconds=2.0, robots=1, seed=0, landings_per_second=10, timestep=0.001, floor=0):
-    """Make robots whose feet land at random, slide now and then, and whose joints work."""
+    """Make robots at 0.5 m/s whose feet land at random and slide, and whose joints swing."""
     rng = np.random.default_rng(seed)
     steps = round(seconds / timestep)
     count = round(seconds * landings_per_second) * robots
@@ -58,12 +60,27 @@ def random_walk(seconds=2.0, robots=1, seed=0, landings_per_second=10, timestep=
             rng.integers(0, robots, count),
             rng.integers(0, 4, count),
             rng.uniform(0.2, 0.6, count),
-            rng.uniform(0.5, 3.0, count),
+            rng.uniform(0.3, 1.5, count),
         ),
         axis=1,
     )
     slides = rng.exponential(0.3, (steps, robots, 4)) * (rng.random((steps, robots, 4)) < 0.5)
-    return make_block(steps, robots, timestep, landings, slides, 3.0, 2.0, floor)
+    torque, speed = (_swings(rng, steps, robots, timestep, size) for size in (10.0, 4.0))
+    block = make_block(steps, robots, timestep, landings, slides, torque, speed, floor)
+    way = np.array([0.5 * timestep, 0.0, 0.0])  # so that no foot strikes the same place for ever
+    ahead = np.arange(steps)[:, None, None] * way
+    block.trunk_pos = block.trunk_pos + ahead
+    block.foot_pos = block.foot_pos + ahead[:, :, None]
+    block.impacts.position = block.impacts.position + landings[:, :1] * way
+    return block
+
+
+def _swings(rng, steps, robots, timestep, size):
+    """Make what goes to and fro a few times a second, otherwise for each joint."""
+    joints = (robots, 12)
+    rate, phase = rng.uniform(1.0, 4.0, joints), rng.uniform(0.0, 2.0 * np.pi, joints)
+    time = timestep * np.arange(steps)[:, None, None]
+    return size * rng.uniform(0.4, 1.0, joints) * np.sin(2.0 * np.pi * rate * time + phase)
 
 
 def a_weighted_level(pressure, rate=RATE):

@@ -44,6 +44,29 @@ def test_an_engine_that_is_gone_becomes_the_one_that_took_its_place():
     assert from_plain(plain).env.engine == "mujoco"
 
 
+def test_friction_whatever_the_floor_becomes_a_factor_on_the_floors():
+    plain = to_plain(make_task("go1_mute"))
+    plain["env"]["scene"]["floor_friction"] = 0.5
+    del plain["env"]["randomization"]["friction_factor"]
+    plain["env"]["randomization"]["friction"] = [0.4, 1.25]
+    assert from_plain(plain).env.randomization.friction_factor == (0.8, 2.5)
+    del plain["env"]["scene"]["floor_friction"]
+    assert from_plain(plain).env.randomization.friction_factor == (0.5, 1.5625)
+
+
+def test_a_configuration_with_both_frictions_is_refused():
+    plain = to_plain(make_task("go1_mute"))
+    plain["env"]["randomization"]["friction"] = [0.4, 1.25]
+    with pytest.raises(ValueError, match=r"friction.*env\.randomization"):
+        from_plain(plain)
+
+
+@pytest.mark.parametrize("bad", ["slippery", [0.4, "high"], 0.4])
+def test_friction_that_is_no_range_is_left_to_be_refused(bad):
+    with pytest.raises(ValueError, match=r"friction.*env\.randomization"):
+        from_plain({"env": {"randomization": {"friction": bad}}})
+
+
 def test_weights_that_were_fields_become_the_terms_that_they_weighed():
     assert from_plain(_with_flat_rewards()) == with_terms_of_then(make_task("go1_mute"))
 

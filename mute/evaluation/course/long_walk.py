@@ -7,7 +7,7 @@ drives it knows nothing of the course but the velocity commands. All levels are 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -20,18 +20,19 @@ from mute.acoustics.floors import FLOORS
 from mute.acoustics.listener import Listener
 from mute.acoustics.metering.levels import READINGS_PER_SECOND
 from mute.acoustics.microphone import Microphone
+from mute.acoustics.physics.room import OPEN, Room
 from mute.acoustics.soundscape import SOURCES
 from mute.controllers.command import Command
 from mute.controllers.controller import Controller
+from mute.controllers.learned import Policy
 from mute.envs.quadruped_env import QuadrupedEnv
-from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.scene import FloorPatch
 from mute.evaluation.course.course import Course
 from mute.evaluation.course.path_following import PathFollower, SpeedHold
 from mute.evaluation.gait import Gait
 from mute.evaluation.noise_levels import SETTLE_TIME
 from mute.evaluation.session import Session
-from mute.evaluation.trials import evaluation_cfg
+from mute.evaluation.usual_robots import robots_cfg
 from mute.rendering.kept_walks import KeptWalks, filming
 
 __all__ = ["FloorLevel", "Track", "Walk", "follow_course", "make_walk_env", "time_limit"]
@@ -145,15 +146,16 @@ def time_limit(course: Course) -> float:
     return 10.0 + 2.0 * course.length / course.speed
 
 
-def make_walk_env(cfg: QuadrupedEnvCfg, course: Course, seed: int) -> QuadrupedEnv:
+def make_walk_env(policy: Policy, course: Course, seed: int, nominal: bool = False) -> QuadrupedEnv:
     """Return an environment for one robot on the floors of a course, facing along +x.
 
     Args:
-        cfg: The environment that the policy was trained in.
+        policy: What walks.
         course: What lies on the ground.
-        seed: Seed of the initial state.
+        seed: Of the robot's physics, its initial state and its noise.
+        nominal: Whether it is the exact model instead, and sees without noise.
     """
-    measured = evaluation_cfg(cfg, num_envs=1, seconds=time_limit(course), seed=seed)
+    measured = robots_cfg(policy, 1, time_limit(course), seed, nominal)
     heard = listening_cfg(measured, patches=_patches(course))
     return QuadrupedEnv(dataclasses.replace(heard, random_heading=False, num_threads=1))
 
@@ -163,7 +165,6 @@ def follow_course(
     controller: Controller,
     course: Course,
     beta: float,
-    gains: Mapping[str, float] | None = None,
     seed: int = 0,
     hold_speed: bool = False,
     keep: KeptWalks | None = None,
@@ -171,6 +172,7 @@ def follow_course(
     microphone: Microphone | None = None,
     sources: Sequence[str] = SOURCES,
     from_energies: bool = False,
+    room: Room = OPEN,
 ) -> Walk:
     """Walk a course from its start to its end, to a fall or the like, or to the time limit.
 
@@ -179,7 +181,6 @@ def follow_course(
         controller: What drives.
         course: Where to walk.
         beta: Quiet factor.
-        gains: Calibration gain by floor, see `Listener`.
         seed: Seed of all noise in the sound.
         hold_speed: Ask for more where the robot falls behind the course's speed; otherwise the
             commands are never above it, whatever becomes of them.
@@ -189,9 +190,10 @@ def follow_course(
         sources: What to hear, of `soundscape.SOURCES`.
         from_energies: Take the levels from energies, without sound that no file wants: quicker, but
             with peaks that are up to 1 dB off, see `mute.acoustics.energy`.
+        room: Where it is heard. Sound of one with walls needs pyroomacoustics.
 
     Raises:
-        MuteError: If a file cannot be written, or nothing renders.
+        MuteError: If a file cannot be written, nothing renders, or what a room needs is missing.
     """
     env.autoreset = False  # a fall ends the walk, and leaves the robot where it fell
     follower = PathFollower(course.path, course.speed)
@@ -208,12 +210,12 @@ def follow_course(
             course.floor_names,
             course.floor_at,
             microphone,
-            gains,
             sources,
             settle_time=SETTLE_TIME,
             seed=seed,
             wav=films.sounds,
             from_energies=from_energies,
+            room=room,
         ) as listener,
     ):
         for _ in range(round(time_limit(course) / env.step_dt)):

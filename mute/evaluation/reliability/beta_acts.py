@@ -9,7 +9,6 @@ from typing import Any
 
 import torch
 
-from mute.acoustics.gains import load_gains
 from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
 from mute.evaluation.gait import GaitMeter
@@ -20,10 +19,10 @@ from mute.evaluation.reliability.conditions import (
     OnWork,
     dealt,
     make_env,
-    randomized_cfg,
     walk,
 )
 from mute.evaluation.reliability.figures import Figure, PartResult, Target
+from mute.evaluation.usual_robots import robots_cfg
 
 __all__ = ["beta_acts_work", "beta_figures", "measure_beta_acts"]
 
@@ -50,7 +49,7 @@ def measure_beta_acts(policy: Policy, robots: int, seed: int, on_work: OnWork) -
     """Measure what beta changes at equal actual speeds.
 
     Args:
-        policy: What walks, `under_conditions`.
+        policy: What walks.
         robots: A sixteenth of them for each beta and commanded speed; half as many are heard.
         seed: Of physics, first states and noise.
         on_work: Is told of the work that is done.
@@ -109,7 +108,7 @@ def _at_speeds(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[di
     """Return the figures of every beta at every actual speed."""
     settings = torch.tensor([(speed, 0.0, 0.0, beta) for beta in BETAS for speed in _COMMANDS])
     command, setting = dealt(settings, each)
-    env = make_env(randomized_cfg(policy, len(command), _WALK_TIME, seed))
+    env = make_env(robots_cfg(policy, len(command), _WALK_TIME, seed))
     meter = GaitMeter(env)
 
     def watch(dones: torch.Tensor) -> None:
@@ -142,10 +141,8 @@ def _levels(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[dict[
         each,
         _HEARD_TIME,
         seed,
-        load_gains(),
         from_energies=True,
         on_step=lambda: on_work(work),
-        randomized=True,
     )
     return [
         {

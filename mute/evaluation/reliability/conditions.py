@@ -14,12 +14,8 @@ from collections.abc import Callable
 import torch
 
 from mute.controllers.controller import Controller
-from mute.controllers.learned import Policy
-from mute.envs.observations import ObservationsCfg
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
-from mute.envs.randomization import RandomizationCfg
-from mute.evaluation.trials import evaluation_cfg
 
 __all__ = [
     "BETAS",
@@ -27,8 +23,6 @@ __all__ = [
     "OnWork",
     "dealt",
     "make_env",
-    "randomized_cfg",
-    "under_conditions",
     "walk",
     "without_noise",
 ]
@@ -41,32 +35,6 @@ SOUND_WORK = 6.0
 
 OnWork = Callable[[float], None]
 """Is told of work that is done, s."""
-
-
-def under_conditions(policy: Policy) -> Policy:
-    """Return a policy whose configuration has the randomisation and the noise of all exams."""
-    env = policy.cfg.env
-    usual = ObservationsCfg()
-    env = dataclasses.replace(
-        env,
-        observations=dataclasses.replace(
-            env.observations, noise=usual.noise, noise_level=usual.noise_level
-        ),
-        randomization=RandomizationCfg(push_interval=0.0),
-    )
-    return dataclasses.replace(policy, cfg=dataclasses.replace(policy.cfg, env=env))
-
-
-def randomized_cfg(policy: Policy, robots: int, seconds: float, seed: int) -> QuadrupedEnvCfg:
-    """Return the environment of a part.
-
-    Args:
-        policy: What walks, `under_conditions`.
-        robots: Number of robots.
-        seconds: Longest time that they walk, s.
-        seed: Of their physics, their first states and the noise.
-    """
-    return evaluation_cfg(policy.cfg.env, robots, seconds, seed, randomized=True)
 
 
 def without_noise(cfg: QuadrupedEnvCfg) -> QuadrupedEnvCfg:

@@ -6,9 +6,10 @@ import torch
 
 from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
-from mute.evaluation.reliability.conditions import OnWork, make_env, randomized_cfg, walk
+from mute.evaluation.reliability.conditions import OnWork, make_env, walk
 from mute.evaluation.reliability.figures import Figure, PartResult, Target
 from mute.evaluation.trials import command_sampler
+from mute.evaluation.usual_robots import robots_cfg
 
 __all__ = ["falls_work", "measure_falls"]
 
@@ -23,12 +24,12 @@ def measure_falls(policy: Policy, robots: int, seed: int, on_work: OnWork) -> Pa
     Commands and betas are drawn evenly from the task's ranges, and drawn anew within the episode.
 
     Args:
-        policy: What walks, `under_conditions`.
+        policy: What walks.
         robots: Number of robots, an episode each.
         seed: Of physics, first states, commands and noise.
         on_work: Is told of the work that is done.
     """
-    env = make_env(randomized_cfg(policy, robots, _EPISODE, seed))
+    env = make_env(robots_cfg(policy, robots, _EPISODE, seed))
     controller = LearnedController(policy, robots)
     cfg = policy.cfg.env.commands.drawn_evenly()
     sampler = command_sampler(cfg, robots, seed)

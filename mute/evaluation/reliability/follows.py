@@ -15,11 +15,11 @@ from mute.evaluation.reliability.conditions import (
     OnWork,
     dealt,
     make_env,
-    randomized_cfg,
     walk,
 )
 from mute.evaluation.reliability.figures import Figure, PartResult, Target, worst
 from mute.evaluation.trials import command_sampler
+from mute.evaluation.usual_robots import robots_cfg
 
 __all__ = ["Following", "follows_work", "measure_follows", "stop_and_go_falls", "velocity_errors"]
 
@@ -62,7 +62,7 @@ def measure_follows(policy: Policy, robots: int, seed: int, on_work: OnWork) -> 
     """Measure speeds, errors over the command range, and falls in stop and go.
 
     Args:
-        policy: What walks, `under_conditions`.
+        policy: What walks.
         robots: A quarter of them walk at each speed and beta; all of them, half at beta 0 and half
             at beta 1, take stop and go, and commands of the whole range.
         seed: Of physics, first states, commands and noise.
@@ -98,7 +98,7 @@ def velocity_errors(policy: Policy, each: int, seed: int, on_work: OnWork) -> di
         on_work: Is told of the work that is done.
     """
     robots = each * len(_BETAS)
-    env = make_env(randomized_cfg(policy, robots, _RANGE_TIME, seed))
+    env = make_env(robots_cfg(policy, robots, _RANGE_TIME, seed))
     controller = LearnedController(policy, robots)
     setting = torch.arange(robots) % len(_BETAS)
     sampler = command_sampler(policy.cfg.env.commands.drawn_evenly(), robots, seed)
@@ -125,7 +125,7 @@ def stop_and_go_falls(policy: Policy, each: int, seed: int, on_work: OnWork) -> 
         on_work: Is told of the work that is done.
     """
     robots = each * len(_BETAS)
-    env = make_env(randomized_cfg(policy, robots, _CHANGES * _CHANGE_TIME, seed))
+    env = make_env(robots_cfg(policy, robots, _CHANGES * _CHANGE_TIME, seed))
     controller = LearnedController(policy, robots)
     setting = torch.arange(robots) % len(_BETAS)
     cfg = policy.cfg.env.commands.drawn_evenly(_STOPPED_SHARE)
@@ -147,7 +147,7 @@ def stop_and_go_falls(policy: Policy, each: int, seed: int, on_work: OnWork) -> 
 def _ratios(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[Following]:
     settings = torch.tensor([(speed, 0.0, 0.0, beta) for beta in _BETAS for speed in SPEEDS])
     command, setting = dealt(settings, each)
-    env = make_env(randomized_cfg(policy, len(command), _WALK_TIME, seed))
+    env = make_env(robots_cfg(policy, len(command), _WALK_TIME, seed))
     meter = GaitMeter(env, _SETTLE_TIME)
 
     def watch(dones: torch.Tensor) -> None:

@@ -14,7 +14,6 @@ from dataclasses import asdict, dataclass
 import torch
 
 from mute.acoustics.audible_env import listening_cfg
-from mute.acoustics.gains import load_gains
 from mute.acoustics.listener import Listener
 from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
@@ -27,11 +26,11 @@ from mute.evaluation.reliability.conditions import (
     OnWork,
     dealt,
     make_env,
-    randomized_cfg,
     walk,
     without_noise,
 )
 from mute.evaluation.reliability.figures import Figure, PartResult, Target, worst
+from mute.evaluation.usual_robots import robots_cfg
 
 __all__ = ["SETTLE_TIME", "Standing", "Stillness", "measure_stands", "stands_work"]
 
@@ -113,7 +112,7 @@ def measure_stands(policy: Policy, robots: int, seed: int, on_work: OnWork) -> P
     """Measure how robots stand, how they recover, and what they sound like.
 
     Args:
-        policy: What walks, `under_conditions`.
+        policy: What walks.
         robots: A third of them at each beta; a quarter of these are heard.
         seed: Of physics, first states, pushes and noise.
         on_work: Is told of the work that is done.
@@ -198,7 +197,7 @@ def _stood_and_pushed(
 ) -> tuple[list[float], list[float]]:
     """Return by beta the share that stands, and the share that does so again after the push."""
     seconds = _WALK_TIME + SETTLE_TIME + _STAND_TIME + _RECOVERY_TIME
-    robots = _Robots(policy, randomized_cfg(policy, each * len(BETAS), seconds, seed), on_work)
+    robots = _Robots(policy, robots_cfg(policy, each * len(BETAS), seconds, seed), on_work)
     env = robots.env
     robots.stop()
     standing = Stillness(env)
@@ -215,7 +214,7 @@ def _stood_and_pushed(
 def _joint_speeds(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[float]:
     """Return the mean speed of the joints of robots that stand with exact sensors, rad/s."""
     seconds = _WALK_TIME + SETTLE_TIME + _STAND_TIME
-    cfg = without_noise(randomized_cfg(policy, each * len(BETAS), seconds, seed))
+    cfg = without_noise(robots_cfg(policy, each * len(BETAS), seconds, seed))
     robots = _Robots(policy, cfg, on_work)
     robots.stop()
     standing = Stillness(robots.env)
@@ -226,12 +225,11 @@ def _joint_speeds(policy: Policy, each: int, seed: int, on_work: OnWork) -> list
 def _levels(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[float]:
     """Return the mean noise level of robots that stand, on wood, dBA."""
     settled = _WALK_TIME + SETTLE_TIME
-    cfg = randomized_cfg(policy, each * len(BETAS), settled + _STAND_TIME, seed)
+    cfg = robots_cfg(policy, each * len(BETAS), settled + _STAND_TIME, seed)
     robots = _Robots(policy, listening_cfg(cfg, _SURFACE), on_work, SOUND_WORK)
     with Listener(
         robots.env,
         [_SURFACE],
-        gains=load_gains(),
         settle_time=settled,
         seed=seed,
         from_energies=True,

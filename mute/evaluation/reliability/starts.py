@@ -28,11 +28,11 @@ from mute.evaluation.reliability.conditions import (
     OnWork,
     dealt,
     make_env,
-    randomized_cfg,
     walk,
 )
 from mute.evaluation.reliability.figures import Figure, PartResult, Target
 from mute.evaluation.trials import evaluation_cfg, from_the_stance
+from mute.evaluation.usual_robots import robots_cfg
 
 __all__ = ["COMMANDS", "Start", "going_times", "measure_starts", "starts_of", "starts_work"]
 
@@ -102,14 +102,14 @@ def measure_starts(policy: Policy, robots: int, seed: int, on_work: OnWork) -> P
     """Start randomised robots with noisy sensors, and the exact robot with exact sensors.
 
     Args:
-        policy: What walks, `under_conditions`.
+        policy: What walks.
         robots: Robots for each command and beta.
         seed: Of physics and noise.
         on_work: Is told of the work that is done.
     """
     seconds = STAND_TIME + TRIAL_TIME
     controller = LearnedController(policy, robots * len(BETAS))
-    cfg = from_the_stance(randomized_cfg(policy, controller.num_envs, seconds, seed))
+    cfg = from_the_stance(robots_cfg(policy, controller.num_envs, seconds, seed))
     randomized = starts_of(make_env(cfg), controller, on_work)
     one_each = LearnedController(policy, len(BETAS))
     nominal_cfg = evaluation_cfg(policy.cfg.env, one_each.num_envs, seconds, seed)

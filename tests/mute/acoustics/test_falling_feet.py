@@ -26,7 +26,7 @@ PLACES = np.array([[0.2, -0.1], [0.2, 0.1], [-0.2, -0.1], [-0.2, 0.1]])
 # A trunk that hovers, and feet that know nothing of it nor of each other.
 _MODEL = """
 <mujoco>
-  <option timestep="{timestep}" gravity="0 0 -{gravity}" integrator="implicitfast"/>
+  <option timestep="{timestep}" gravity="0 0 -{gravity}" integrator="implicitfast" cone="elliptic"/>
   <worldbody>
     <geom name="floor" type="plane" size="5 5 0.1" contype="1" conaffinity="0"/>
     <body name="trunk" pos="0 0 1" gravcomp="1">

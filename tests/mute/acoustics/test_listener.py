@@ -12,7 +12,6 @@ from places import SHIPPED_POLICY
 
 from mute.acoustics.audible_env import listening_cfg, make_listening_env
 from mute.acoustics.files.reading import read_wav
-from mute.acoustics.gains import load_gains
 from mute.acoustics.listener import SAMPLE_RATE, Listener
 from mute.acoustics.metering.levels import LevelDetector
 from mute.acoustics.tally import HeardLevels
@@ -55,7 +54,7 @@ def _policy_trial(upset: int | None, from_energies: bool) -> tuple[HeardLevels, 
     """Return the levels of a robot that may be upset in mid-trial, and its loudest reading."""
     policy = load_policy(SHIPPED_POLICY)
     env = make_listening_env(evaluation_cfg(policy.cfg.env, 1, 20.0, seed=1), "tile")
-    listener = Listener(env, ["tile"], gains=load_gains(), from_energies=from_energies)
+    listener = Listener(env, ["tile"], from_energies=from_energies)
     steps = count()
 
     def hear(_: object, dones: torch.Tensor) -> None:
@@ -154,7 +153,7 @@ def test_a_simulation_that_blows_up_is_not_heard(tmp_path):
     assert all(levels.pnl < 58.0 for levels in listener.levels())
     assert np.isfinite(listener.levels()[1].laeq)
     begin = round((1.5 - SETTLE) * SAMPLE_RATE)
-    assert np.abs(read_wav(path)[0][0, begin : begin + 960]).max() < 0.01
+    assert np.abs(read_wav(path)[0][0, begin : begin + 960]).max() < 0.02
 
 
 def test_a_file_begins_once_the_robot_has_settled(tmp_path):

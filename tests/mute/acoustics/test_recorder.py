@@ -15,10 +15,10 @@ from mute.acoustics.recorder import Recorder, effective_mass
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
-from mute.envs.scene import FloorPatch, SceneCfg
+from mute.envs.scene import Cone, FloorPatch, SceneCfg
 
 
-def _make_env(**scene) -> QuadrupedEnv:
+def _make_env(cone: Cone = "elliptic", **scene) -> QuadrupedEnv:
     return QuadrupedEnv(
         QuadrupedEnvCfg(
             num_envs=2,
@@ -27,7 +27,7 @@ def _make_env(**scene) -> QuadrupedEnv:
             initial_joint_noise=0.0,
             initial_velocity=0.0,
             random_heading=False,
-            scene=SceneCfg(timestep=0.001, foot_forces=True, **scene),
+            scene=SceneCfg(timestep=0.001, foot_forces=True, cone=cone, **scene),
             randomization=RandomizationCfg(enabled=False),
         )
     )
@@ -107,10 +107,17 @@ def test_a_simulation_that_blew_up_is_recorded_at_rest():
     recorder.restart(env.unstable.numpy(), env.unstable.numpy())
     _walk(env, 3)
     block = recorder.take()
-    for name in ("friction_power", "joint_power", "joint_speed", "foot_pos", "trunk_pos"):
+    for name in (
+        "friction_power",
+        "joint_pos",
+        "joint_vel",
+        "joint_torque",
+        "foot_pos",
+        "trunk_pos",
+    ):
         assert np.isfinite(getattr(block, name)).all()
-    assert not block.joint_speed[:20, 0].any()
-    assert block.joint_speed[:20, 1].any()
+    assert not block.joint_vel[:20, 0].any()
+    assert block.joint_vel[:20, 1].any()
     assert len(block.part(0, 20).impacts) == 0
 
 
@@ -150,7 +157,7 @@ def test_blocks_tile_the_recording_whatever_their_length():
             _walk(env, chunk)
             taken.append(recorder.take())
     one, *many = taken
-    for name in ("friction_power", "foot_pos", "floor", "joint_power", "trunk_quat"):
+    for name in ("friction_power", "foot_pos", "floor", "joint_torque", "trunk_quat"):
         joined = np.concatenate([getattr(block, name) for block in many])
         np.testing.assert_allclose(getattr(one, name), joined, rtol=1e-6, atol=1e-9)
     for name in ("time", "robot", "foot", "speed", "mass", "position"):
@@ -162,7 +169,14 @@ def test_blocks_tile_the_recording_whatever_their_length():
 
 
 def _assert_same_block(one: ContactBlock, other: ContactBlock) -> None:
-    for name in ("friction_power", "foot_pos", "joint_power", "joint_speed", "trunk_pos"):
+    for name in (
+        "friction_power",
+        "foot_pos",
+        "joint_pos",
+        "joint_vel",
+        "joint_torque",
+        "trunk_pos",
+    ):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
     for name in ("time", "robot", "foot", "speed", "mass", "position"):
         np.testing.assert_array_equal(getattr(one.impacts, name), getattr(other.impacts, name))
@@ -197,7 +211,14 @@ def test_one_robot_alone_is_recorded_as_among_the_others():
         blocks.append(recorder.take())
     everyone, alone = blocks
     assert alone.num_robots == 1
-    for name in ("friction_power", "foot_pos", "joint_power", "joint_speed", "trunk_pos"):
+    for name in (
+        "friction_power",
+        "foot_pos",
+        "joint_pos",
+        "joint_vel",
+        "joint_torque",
+        "trunk_pos",
+    ):
         theirs = getattr(everyone, name)[:, 1]
         np.testing.assert_allclose(getattr(alone, name)[:, 0], theirs, rtol=1e-6, atol=1e-9)
     own = everyone.impacts.select(everyone.impacts.robot == 1)
@@ -233,6 +254,44 @@ def test_a_block_of_nothing_and_an_environment_without_forces_are_refused():
     cfg = dataclasses.replace(env.cfg, scene=SceneCfg(timestep=0.001))
     with pytest.raises(ValueError, match="foot_forces"):
         Recorder(QuadrupedEnv(cfg))
+
+
+def test_with_pyramidal_cones_no_foot_is_known_to_slide():
+    env = _make_env(floor_friction=0.2, cone="pyramidal")
+    recorder = Recorder(env)
+    _walk(env, 60)
+    env.simulation.qvel[0, 1] = 0.5
+    _walk(env, 25)
+    assert recorder.take().friction_power.max() == 0.0
+
+
+def test_recording_changes_nothing_of_what_is_saved():
+    env = _make_env()
+    before = set(env.state_dict()["simulation"])
+    Recorder(env)
+    assert set(env.state_dict()["simulation"]) == before
+
+
+def test_each_robot_slides_where_its_own_friction_on_its_floor_is_used_up():
+    slippery = FloorPatch((-3.0, -3.0), (3.0, 3.0), 0.1, (0.02, 1.0))
+    rough = FloorPatch((3.0, -3.0), (9.0, 3.0), 0.8, (0.02, 1.0))
+    env = _make_env(floor_patches=(rough, slippery))
+    env.simulation.field("geom_friction")[1, :, 0] *= 8.0
+    recorder = Recorder(env, lambda xy: (xy[..., 0] > 3.0).astype(np.int8))
+    _walk(env, 60)
+    recorder.take()
+    env.simulation.qvel[:, 1] = 0.2
+    _walk(env, 10)
+    power = recorder.take().friction_power.sum(axis=(0, 2)) * 0.001
+    # At 0.2 m/s the legs give way by less than the rough floor holds: one robot's feet creep.
+    assert power[0] > 0.02
+    assert power[1] == 0.0
+    env.simulation.qpos[0, 0] += 6.0
+    _walk(env, 30)
+    recorder.take()
+    env.simulation.qvel[:, 1] = 0.2
+    _walk(env, 10)
+    assert recorder.take().friction_power[:, 0].max() == 0.0
 
 
 _BODY = """

@@ -21,7 +21,7 @@ def files():
     return card.read_results(card.CardArgs())
 
 
-@pytest.mark.parametrize("name", ["results.md", "benchmark.md"])
+@pytest.mark.parametrize("name", ["results.md", "sound.md", "benchmark.md"])
 def test_a_committed_page_is_what_the_command_makes(name, tmp_path):
     assert card.main(["--out", str(tmp_path)]) == 0
     made, committed = (folder / name for folder in (tmp_path, REPOSITORY / "docs"))
@@ -33,10 +33,10 @@ def test_the_front_page_has_the_table_of_the_results_and_says_what_it_is_of(file
     assert " ".join(summary(files).split()) in words
 
 
-def test_without_a_directory_both_pages_are_printed(capsys):
+def test_without_a_directory_all_pages_are_printed(capsys):
     assert card.main([]) == 0
     headings = re.findall("^# .*$", capsys.readouterr().out, re.MULTILINE)
-    assert headings == ["# Results", "# Speed"]
+    assert headings == ["# Results", "# Sound", "# Speed"]
 
 
 def test_a_spread_is_that_of_the_trainings(files):
@@ -81,7 +81,8 @@ def test_the_policy_that_ships_is_the_one_in_the_middle(files):
 
 def test_what_the_level_loses_with_beta_is_compared_at_equal_actual_speed(files):
     def row(beta, command, speed, level):
-        return {"beta": beta, "command_speed": command, "speed_mean": speed, "mnl_mean": level}
+        own = {"beta": beta, "command_speed": command, "speed_mean": speed, "mnl_mean": level}
+        return {"robots": "different"} | own
 
     # Level rises by 10 dB per 1 m/s; beta 1 is 20 % slower, and 3 dB quieter at the same speed.
     sweep = [
@@ -89,12 +90,28 @@ def test_what_the_level_loses_with_beta_is_compared_at_equal_actual_speed(files)
         for beta, share, quieter in ((0.0, 1.0, 0.0), (1.0, 0.8, 3.0))
         for command in (0.4, 0.7, 1.0)
     ]
-    page = results_page(dataclasses.replace(files, sweep_speed=sweep))
+    exact = [each | {"robots": "nominal", "mnl_mean": 90.0} for each in sweep]
+    page = results_page(dataclasses.replace(files, sweep_speed=[*sweep, *exact]))
     assert "by 3 dB at the same actual speed, 0.4 to 0.8 m/s" in page
     assert "by 4 to 5 dB at the same command" in page
-    slow = [row | {"speed_mean": 0.9 * row["speed_mean"]} for row in sweep]
+    slow = [each | {"speed_mean": 0.9 * float(each["speed_mean"])} for each in sweep]
     page = results_page(dataclasses.replace(files, sweep_speed=slow))
     assert "at the same actual speed, 0.4 to 0.7 m/s" in page  # beta 1 gets to 0.72
+
+
+def test_levels_of_an_earlier_calibration_are_told_with_their_seeds(files):
+    def changed(seed, run):
+        calibration = "another" if seed in (1, 3) else files.calibration
+        return dataclasses.replace(
+            run, reliability=run.reliability | {"calibration_sha256": calibration}
+        )
+
+    seeds = {seed: changed(seed, run) for seed, run in files.seeds.items()}
+    assert "model of the sound (seeds 1, 3)" in results_page(
+        dataclasses.replace(files, seeds=seeds)
+    )
+    same = {seed: changed(0, run) for seed, run in files.seeds.items()}
+    assert "earlier model" not in results_page(dataclasses.replace(files, seeds=same))
 
 
 def test_markdown_formats_each_column_and_leaves_a_dash_for_what_is_missing():
@@ -130,5 +147,5 @@ def test_the_card_tells_levels_without_spread_and_how_many_trials_have_one(tmp_p
     path.write_text(json.dumps(rows))
     card.main(["--noise", str(path)])
     shown = capsys.readouterr().out
-    assert "| wood | 0 | 68.0 (1 of 5 trials) |" in shown
+    assert f"| wood | 0 | 68.0 (1 of {rows[0]['trials']} trials) |" in shown
     assert "| wood | 1 | - |" in shown

@@ -14,6 +14,7 @@ import pytest
 from places import SHIPPED_POLICY
 
 from mute.acoustics.microphone import Microphone
+from mute.acoustics.physics.room import OPEN, ROOMS
 from mute.command_lines import evaluate, evaluate_noise, sound_options
 from mute.command_lines import evaluate_walk as walk
 from mute.command_lines.arguments import make_directory
@@ -24,16 +25,19 @@ from mute.support.errors import MuteError
 
 SHIPPED = SHIPPED_POLICY
 PROMISED = {
-    "method", "beta", "surface", "command_speed", "trials", "mnl_mean", "mnl_std", "pnl_mean",
-    "pnl_std", "laeq_mean", "speed_mean", "velocity_error_sq", "landing_speed_rms", "apex_mean",
-    "duty_factor", "stride_frequency", "power", "cost_of_transport",
+    "method", "beta", "surface", "robots", "command_speed", "trials", "mnl_mean", "mnl_std",
+    "pnl_mean", "pnl_std", "laeq_mean", "laeq_body", "speed_mean", "velocity_error_sq",
+    "landing_speed_rms", "apex_mean", "duty_factor", "stride_frequency", "power",
+    "cost_of_transport",
 }  # fmt: skip
+_FILMED = ["sweep-speed", "--trials", "8", "--beta", "0,0.5,1", "--video", "walk.mp4"]
 TENTHS = ",".join(f"{0.1 * tenth:.1f}" for tenth in range(1, 12))
 
 
-def _row(beta: float, surface: str = "wood", speed: float = 0.5) -> NoiseRow:
+def _row(beta: float, surface: str = "wood", speed: float = 0.5, nominal: bool = False) -> NoiseRow:
     values: dict[str, Any] = dict.fromkeys(NoiseRow.__dataclass_fields__, 0.25)
     values |= {"method": "go1_mute", "beta": beta, "surface": surface, "trials": 1}
+    values["robots"] = "nominal" if nominal else "different"
     values |= {"command_speed": speed, "speed_mean": speed, "mnl_mean": 60.0, "pnl_mean": 65.0}
     return NoiseRow(**values)
 
@@ -43,9 +47,9 @@ def asked(monkeypatch) -> list[dict[str, Any]]:
     """Take the place of the measurement; return what it was asked for, floor by floor."""
     calls: list[dict[str, Any]] = []
 
-    def measure(policy, surface, settings, trials, seconds, seed, gains, keep, **options):
-        calls.append({"surface": surface, "keep": keep, **options})
-        return [_row(setting.beta, surface, setting.command_speed) for setting in settings]
+    def measure(policy, surface, settings, trials, seconds, seed, keep, nominal, **options):
+        calls.append({"surface": surface, "keep": keep, "nominal": nominal, **options})
+        return [_row(each.beta, surface, each.command_speed, nominal) for each in settings]
 
     monkeypatch.setattr(evaluate_noise, "measure_noise", measure)
     return calls
@@ -135,6 +139,77 @@ def test_a_listener_and_the_sources_come_to_the_measurement(asked, tmp_path):
     assert asked[0]["sources"] == ("impacts", "drive")
 
 
+def test_robots_as_they_are_are_measured_and_twins_of_the_exact_model_beside_if_asked(
+    asked, tmp_path, capsys
+):
+    wav = tmp_path / "walk.wav"
+    words = ["--surface", "tile", "--beta", "0", "--out", str(tmp_path), "--wav", str(wav)]
+    evaluate.main(["noise", *words])
+    assert [call["nominal"] for call in asked] == [False]
+    evaluate.main(["noise", *words, "--nominal"])
+    assert [call["nominal"] for call in asked[1:]] == [False, True]
+    assert [call["keep"].wav for call in asked[1:]] == [{0: wav}, {}]
+    assert [row["robots"] for row in _read_back(tmp_path, "noise")] == ["different", "nominal"]
+    assert "tile, exact" in capsys.readouterr().out
+
+
+def test_the_figures_of_a_sweep_are_of_robots_as_they_are(asked, monkeypatch, tmp_path):
+    drawn = []
+    monkeypatch.setattr(
+        "mute.evaluation.noise_figures.draw_beta_sweep", lambda rows, _: drawn.extend(rows) or []
+    )
+    evaluate.main(["sweep-beta", "--beta", "0,1", "--nominal", "--out", str(tmp_path)])
+    assert [row.robots for row in drawn] == ["different", "different"]
+
+
+def test_a_mean_level_that_is_not_known_well_is_told(monkeypatch, tmp_path, capsys):
+    for width, told in ((0.25, False), (0.45, True)):
+        row = dataclasses.replace(_row(0.0), mnl_ci95=width)
+        monkeypatch.setattr(evaluate_noise, "measure_noise", lambda *_, row=row, **__: [row])
+        evaluate.main(["noise", "--surface", "wood", "--beta", "0", "--out", str(tmp_path)])
+        assert ("MNL is up to ±0.5 dB; more --trials" in capsys.readouterr().err) == told
+
+
+def test_floors_that_are_done_outlive_an_interrupt(monkeypatch, tmp_path):
+    rows = iter([[_row(0.0)]])
+
+    def measure(*_, **__) -> list[NoiseRow]:
+        for row in rows:
+            return row
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(evaluate_noise, "measure_noise", measure)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate.main(["noise", "--beta", "0", "--out", str(tmp_path)])
+    assert [row["surface"] for row in _read_back(tmp_path, "noise")] == ["wood"]
+    assert json.loads((tmp_path / "noise_about.json").read_text())["stopped"] is True
+
+
+def test_walls_make_the_levels_come_from_energies(asked, tmp_path):
+    words = ["noise", "--surface", "wood", "--out", str(tmp_path)]
+    evaluate.main(words)
+    evaluate.main([*words, "--room", "ward"])
+    evaluate.main([*words, "--room", "60,10"])
+    assert [call["from_energies"] for call in asked] == [False, True, True]
+    assert [call["room"] for call in asked[:2]] == [OPEN, ROOMS["ward"]]
+    assert asked[2]["room"].volume == pytest.approx(60.0)
+    assert asked[2]["room"].absorption == 10.0
+
+
+def test_sound_of_a_room_that_nothing_can_make_is_told_before_anything_is_measured(
+    asked, monkeypatch, tmp_path
+):
+    def fail() -> None:
+        raise MuteError("no pyroomacoustics")
+
+    monkeypatch.setattr(sound_options, "check_rooms_heard", fail)
+    words = ["--room", "ward", "--out", str(tmp_path), "--beta", "0"]
+    for command in (["noise"], ["walk"]):
+        with pytest.raises(MuteError, match="no pyroomacoustics"):
+            evaluate.main([*command, *words, "--wav", str(tmp_path / "walk.wav")])
+    assert asked == []
+
+
 def test_a_microphone_can_stand_in_the_world(asked, tmp_path):
     evaluate.main(["noise", "--microphone", "world:2,-1.5,1.2", "--out", str(tmp_path)])
     assert asked[0]["microphone"] == Microphone((2.0, -1.5, 1.2), "world")
@@ -142,7 +217,7 @@ def test_a_microphone_can_stand_in_the_world(asked, tmp_path):
 
 def test_clipped_samples_are_a_line_on_standard_error(monkeypatch, tmp_path, capsys):
     def measure(*words, **__):
-        words[7].note_clipped({0: 12})
+        words[6].note_clipped({0: 12})
         return [_row(0.0)]
 
     monkeypatch.setattr(evaluate_noise, "measure_noise", measure)
@@ -173,7 +248,7 @@ def test_a_sweep_of_more_betas_than_colours_draws_them_all(monkeypatch, tmp_path
 def test_a_walk_takes_sources_and_microphone_and_commands_the_course_speed(monkeypatch, tmp_path):
     heard = {}
 
-    def follow(env, controller, course, beta, gains, seed, hold_speed, keep, on_step, **options):
+    def follow(env, controller, course, beta, seed, hold_speed, keep, on_step, **options):
         on_step(1.0)
         heard.update(options, hold_speed=hold_speed)
         raise MuteError("enough")
@@ -203,7 +278,7 @@ def test_a_walk_takes_sources_and_microphone_and_commands_the_course_speed(monke
         (["noise", "--trials", "0"], ["--trials", "0"]),
         (["noise", "--trials", "2000"], ["--trials", "1024"]),
         (["noise", "--seconds", "nan"], ["--seconds", "nan"]),
-        (["noise", "--sources", "fan,bark"], ["--sources", "impacts, scuffing", "'bark'"]),
+        (["noise", "--sources", "fan,bark"], ["--sources", "impacts, body", "'bark'"]),
         (["noise", "--sources", ""], ["--sources", "none"]),
         (["noise", "--sources", "fan,fan"], ["--sources", "fan again"]),
         (["noise", "--microphone", "ceiling"], ["--microphone", "X,Y,Z", "'ceiling'"]),
@@ -214,11 +289,18 @@ def test_a_walk_takes_sources_and_microphone_and_commands_the_course_speed(monke
         (["walk", "--microphone", "0,nan,1"], ["--microphone", "'0,nan,1'"]),
         (["noise", "--microphone", "0,1,-0.2"], ["--microphone", "below the ground"]),
         (["noise", "--microphone", "1e9,0,1"], ["--microphone", "within 100 m"]),
+        (["noise", "--room", "cave"], ["--room", "office, corridor, ward", "V,A", "'cave'"]),
+        (["walk", "--room", "60"], ["--room", "'60'"]),
+        (["walk", "--room", "60,110"], ["--room", "below the 97 m2", "'60,110'"]),
+        (["walk", "--room", "1e6,0.1"], ["--room", "reverberation time", "<= 10 s"]),
+        (["noise", "--room", "0,10"], ["--room", "volume", ">= 1", "'0,10'"]),
+        (["noise", "--room", "60,nan"], ["--room", "absorption area", "'60,nan'"]),
+        (["walk", "--trials", "0"], ["--trials", "0"]),
         (["noise", "--wav", "walk.mp3"], ["--wav", "'walk.mp3'"]),
         (["sweep-beta", "--video", "walk.avi"], ["--video", "'walk.avi'"]),
         (["walk", "--video", "walk"], ["--video", "'walk'"]),
         (
-            ["sweep-speed", "--beta", "0,0.5,1", "--speed", TENTHS, "--video", "walk.mp4"],
+            [*_FILMED, "--speed", TENTHS],
             ["--video", "33 films", "at most 32"],
         ),
         (["walk", "--wav", "walk"], ["--wav", "'walk'"]),

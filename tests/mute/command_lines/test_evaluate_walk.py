@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import wave
 
@@ -13,6 +14,7 @@ from places import SHIPPED_POLICY
 
 from mute.acoustics.origin import sound_origin
 from mute.command_lines import evaluate
+from mute.command_lines import evaluate_walk as walk
 from mute.controllers import load_policy
 from mute.evaluation.course.course import Course, FloorArea
 from mute.support.errors import MuteError
@@ -41,12 +43,19 @@ def _write_course(directory, course):
 
 def test_the_command_writes_figures_track_map_and_sound(tmp_path, capsys):
     course, out, wav = _write_course(tmp_path, COURSE), tmp_path / "out", tmp_path / "walk.wav"
-    arguments = ["--course", course, "--out", out, "--wav", wav, "--beta", "0"]
+    arguments = ["--course", course, "--out", out, "--wav", wav, "--beta", "0", "--trials", "2"]
+    arguments.append("--nominal")
     assert evaluate.main(["walk", *map(str, arguments)]) == 0
     content = json.loads((out / "walk.json").read_text())
     assert content["end"] == "arrived"
     assert content["beta"] == 0.0
     assert content["iteration"] == load_policy(POLICY).iteration
+    assert (content["trials"], content["arrived"], content["stopped"]) == (2, 2, False)
+    levels = [content["mnl"], content["others"][0]["mnl"]]
+    assert levels[0] != levels[1]
+    assert content["mnl_mean"] == pytest.approx(np.mean(levels))
+    assert content["mnl_std"] == pytest.approx(np.std(levels, ddof=1))
+    assert len(content["others"]) == len(content["nominal"]) == 1
     assert content.items() >= sound_origin(POLICY).items()
     assert content["mnl"] < content["pnl"]
     with (out / "track.csv").open(newline="") as file:
@@ -59,8 +68,29 @@ def test_the_command_writes_figures_track_map_and_sound(tmp_path, capsys):
         assert file.getnframes() / file.getframerate() == pytest.approx(content["seconds"] - 1.0)
     shown = capsys.readouterr().out
     assert "arrived after 1.6 m" in shown
+    assert "2 of 2 arrived: MNL" in shown
     assert shown.endswith(f"kept: {wav}\n")
     assert "modelled" in shown
+
+
+def test_walks_that_were_walked_outlive_an_interrupt(tmp_path, monkeypatch):
+    real, walked = walk.follow_course, []
+
+    def follow(*words, **options):
+        if walked:
+            raise KeyboardInterrupt
+        walked.append(real(*words, **options))
+        return walked[0]
+
+    monkeypatch.setattr(walk, "follow_course", follow)
+    short = dataclasses.replace(COURSE, path=((0.0, 0.0), (0.5, 0.0)))
+    course = _write_course(tmp_path, short)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate.main(["walk", "--course", str(course), "--out", str(tmp_path / "out")])
+    content = json.loads((tmp_path / "out" / "walk.json").read_text())
+    assert (content["trials"], content["stopped"]) == (1, True)
+    assert content["others"] == []
+    assert content["mnl_ci95"] is None
 
 
 @pytest.mark.parametrize(

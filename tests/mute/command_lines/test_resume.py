@@ -141,7 +141,7 @@ def test_an_option_that_a_resumed_run_cannot_heed_is_refused(arguments, words, f
         ("--env.scene.timestep", "0.004", "env.scene.timestep: a resumed run keeps 0.005, got"),
         ("--env.footfall.landing-window", "0.06", "env.footfall.landing_window: a resumed run"),
         ("--num-envs", "16", "env.num_envs: a resumed run keeps 32, got 16"),
-        ("--env.randomization.friction", "0.3 0.9", "env.randomization.friction: a resumed run"),
+        ("--env.randomization.gain-scale", "0.8 1.2", "env.randomization.gain_scale: a resumed"),
     ],
 )
 def test_a_field_that_a_resumed_run_cannot_change_is_named_and_nothing_is_written(

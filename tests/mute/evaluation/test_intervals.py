@@ -1,4 +1,4 @@
-"""Tests of the interval of a median."""
+"""Tests of the intervals of a mean and of a median."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from mute.evaluation.intervals import median_interval
+from mute.evaluation.intervals import mean_with_interval, median_interval
 
 
 @pytest.mark.parametrize(
@@ -54,3 +54,12 @@ def test_intervals_of_skewed_times_hold_the_true_median_as_often_as_they_say(num
     expected = 1.0 - 2.0 * binom.cdf(rank - 1, number, 0.5)
     assert held / len(draws) == pytest.approx(expected, abs=0.015)
     assert expected >= 0.95
+
+
+def test_a_mean_has_students_interval_and_a_single_value_none():
+    mean, deviation, half_width = mean_with_interval([1.0, 2.0, 3.0])
+    assert (mean, deviation) == (2.0, 1.0)
+    assert half_width == pytest.approx(4.303 / 3**0.5, rel=1e-3)  # t of 2 degrees of freedom
+    assert mean_with_interval([1.5])[0] == 1.5
+    assert all(map(math.isnan, (*mean_with_interval([1.5])[1:], *mean_with_interval([]))))
+    assert all(map(math.isnan, mean_with_interval([1.5, math.nan])))

@@ -12,8 +12,7 @@ from places import SHIPPED_POLICY
 from quick_products import use_bfloat16
 from scipy import stats
 
-from mute.acoustics import listener
-from mute.acoustics.gains import load_gains
+from mute.acoustics import energy, listener
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.soundscape import SOURCES
 from mute.acoustics.sources.fan import FAN_LEVEL
@@ -23,7 +22,6 @@ from mute.evaluation import noise_levels as noise
 from mute.evaluation import noise_probe
 from mute.evaluation.noise_levels import NoiseRow, NoiseSetting, measure_noise
 from mute.evaluation.noise_probe import NoiseProbe
-from mute.evaluation.paper_levels import PAPER_LEVELS
 from mute.rendering.kept_walks import KeptWalks
 from mute.support.errors import MuteError
 from mute.support.precision import hidden_dtype
@@ -32,7 +30,7 @@ from mute.support.precision import hidden_dtype
 def _measure(seed: int, trials: int = 5, seconds: float = 3.0, **options) -> list[NoiseRow]:
     policy = load_policy(SHIPPED_POLICY)
     settings = [NoiseSetting(beta, 0.5) for beta in (0.0, 1.0)]
-    return measure_noise(policy, "wood", settings, trials, seconds, seed, load_gains(), **options)
+    return measure_noise(policy, "wood", settings, trials, seconds, seed, **options)
 
 
 @pytest.fixture(scope="module")
@@ -44,9 +42,11 @@ def test_the_same_seed_gives_the_same_table(rows):
     assert _measure(seed=1) == rows
 
 
-def test_the_gain_that_ships_gives_the_level_that_it_was_fitted_to(rows):
-    mnl, _ = PAPER_LEVELS["mute beta 0"]["wood"]
-    assert rows[0].mnl_mean == pytest.approx(mnl, abs=0.5)
+def test_robots_differ_unless_they_are_twins_of_the_exact_model(rows):
+    exact = _measure(seed=1, nominal=True)
+    assert [row.robots for row in (*rows, *exact)] == ["different"] * 2 + ["nominal"] * 2
+    for usual, twin in zip(rows, exact, strict=True):
+        assert twin.mnl_std < usual.mnl_std
 
 
 def test_a_policy_compared_with_itself_differs_by_less_than_its_confidence_interval(rows):
@@ -80,7 +80,8 @@ def test_the_levels_of_the_sources_add_up_to_the_whole(rows):
         assert total == pytest.approx(row.laeq_mean, abs=0.5)
         assert row.laeq_fan == pytest.approx(FAN_LEVEL, abs=0.5)
     loud, quiet = rows
-    assert loud.laeq_impacts - quiet.laeq_impacts > 4.0
+    assert loud.laeq_impacts - quiet.laeq_impacts > 3.0
+    assert loud.laeq_body - quiet.laeq_body > 3.0
 
 
 def test_a_source_that_is_not_heard_has_no_level():
@@ -135,7 +136,7 @@ def test_a_probe_of_a_training_is_near_the_table_and_draws_no_random_number(rows
     levels = NoiseProbe().measure(policy)
     assert torch.equal(torch.get_rng_state(), before)
     expected = {f"Noise/level_beta_{row.beta:g}": row.mnl_mean for row in rows}
-    assert levels == pytest.approx(expected, abs=1.0)
+    assert levels == pytest.approx(expected, abs=2.0)  # other robots
 
 
 def test_a_probe_walks_in_full_precision_whatever_the_training_computes_in(monkeypatch):
@@ -157,7 +158,7 @@ def test_a_training_that_measures_no_noise_needs_no_calibration(monkeypatch):
         raise MuteError("no calibration")
 
     policy = load_policy(SHIPPED_POLICY)
-    monkeypatch.setattr(noise_probe, "load_gains", fail)
+    monkeypatch.setattr(energy, "load_transmissibility", fail)
     probe = NoiseProbe()
     with pytest.raises(MuteError, match="no calibration"):
         probe.measure(policy)

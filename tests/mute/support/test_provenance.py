@@ -11,7 +11,7 @@ import git
 import pytest
 from places import SHIPPED_POLICY
 
-from mute.acoustics.gains import GAINS_FILE
+from mute.acoustics.body import CALIBRATION_FILE
 from mute.acoustics.origin import sound_origin
 from mute.command_lines import evaluate
 from mute.support import provenance
@@ -50,11 +50,11 @@ def test_outside_git_the_commit_is_unknown(tmp_path, monkeypatch):
     assert provenance.current_commit() == "unknown"
 
 
-def test_the_origin_of_levels_names_the_policy_the_gains_the_commit_and_the_machine():
+def test_the_origin_of_levels_names_the_policy_the_calibration_the_commit_and_the_machine():
     origin = sound_origin(SHIPPED)
     assert origin["policy"] == "resources/go1/go1_mute.pt"
     assert origin["policy_sha256"] == hashlib.sha256(SHIPPED.read_bytes()).hexdigest()
-    assert origin["calibration_sha256"] == hashlib.sha256(GAINS_FILE.read_bytes()).hexdigest()
+    assert origin["calibration_sha256"] == hashlib.sha256(CALIBRATION_FILE.read_bytes()).hexdigest()
     assert origin["commit"] == provenance.current_commit()
     assert re.search(r", (1 core|\d+ cores)\b", origin["machine"])
 
@@ -66,8 +66,8 @@ def test_a_table_of_levels_has_its_origin_beside_it(tmp_path):
     assert about.items() >= sound_origin(SHIPPED).items()
 
 
-def test_the_gains_that_ship_were_fitted_to_the_policy_that_ships():
-    fitted = json.loads(GAINS_FILE.read_text())["policy"]
+def test_the_calibration_that_ships_was_fitted_to_the_policy_that_ships():
+    fitted = json.loads(CALIBRATION_FILE.read_text())["policy"]
     assert fitted["sha256"] == provenance.file_sha256(SHIPPED)
 
 

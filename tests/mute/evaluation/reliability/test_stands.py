@@ -11,8 +11,8 @@ from exam_helpers import make_random_policy
 from standing import Standing
 
 from mute.evaluation.reliability import stands
-from mute.evaluation.reliability.conditions import under_conditions
 from mute.evaluation.reliability.stands import Stillness, measure_stands
+from mute.evaluation.usual_robots import under_conditions
 
 
 class _Frames:

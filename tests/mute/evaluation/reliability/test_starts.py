@@ -12,9 +12,9 @@ from standing import Standing
 
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.reliability import starts
-from mute.evaluation.reliability.conditions import under_conditions
 from mute.evaluation.reliability.starts import COMMANDS, going_times, starts_of
 from mute.evaluation.trials import evaluation_cfg, from_the_stance
+from mute.evaluation.usual_robots import under_conditions
 
 _DT = 0.02
 _STEPS = round(starts.TRIAL_TIME / _DT)

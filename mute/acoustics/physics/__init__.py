@@ -1,0 +1,1 @@
+"""Laws of structural acoustics: contacts, plates, layers, rooms. Nothing here knows of robots."""

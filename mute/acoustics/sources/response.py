@@ -1,0 +1,107 @@
+"""From a force on a plate to the pressure at a microphone, as a filter."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Literal
+
+import numpy as np
+from numpy.fft import irfft, rfft, rfftfreq
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
+
+from mute.acoustics.physics.plate import Plate
+from mute.acoustics.physics.ringing import OCTAVES, ringing_responses
+
+__all__ = ["PLACES", "PlateResponse", "floor_response"]
+
+PLACES = 12
+"""Places of a plate that sound different when they are struck."""
+
+_LONGEST_PULSE = 0.15
+"""Longest force that the filter takes in, s: on carpet 4 kg press for 0.12 s at 5 cm/s. What is
+slower still, and is not heard, is cut."""
+
+
+def _above(corner: float, frequency: NDArray) -> NDArray[np.complex128]:
+    """Return a high pass of Butterworth's of the second order."""
+    ratio = 1j * frequency / corner
+    return ratio**2 / (1.0 + np.sqrt(2.0) * ratio + ratio**2)
+
+
+class PlateResponse:
+    """What a plate makes of a force: its near field at once, and its ringing."""
+
+    def __init__(
+        self, plate: Plate, sample_rate: int, form: Literal["floor", "body"], panels: int = 1
+    ) -> None:
+        """Draw the modes; the same plate rings the same each time.
+
+        Args:
+            plate: The plate.
+            sample_rate: Hz.
+            form: Whether one stands upon it, so that ringing leaves it around the blow and from
+                all of it (`Plate.spread`), or it is small, and all sound goes as from a point.
+            panels: Number of such plates that share the sound, each with modes of its own.
+        """
+        seed = round(1e6 * (plate.surface_mass + plate.critical_frequency))
+        # A shell is small: of the few modes of a band none may be struck at one place alone.
+        ringing = ringing_responses(
+            plate, sample_rate, PLACES, seed, even=form == "body", panels=panels
+        )
+        longest_pulse = round(_LONGEST_PULSE * sample_rate)
+        length = next_fast_len(ringing.shape[2] + longest_pulse, real=True)
+        assert length is not None
+        self.length = length
+        """Samples that a response takes."""
+        self.longest_pulse = longest_pulse
+        """Samples that a force may take."""
+        self._plate, self._form = plate, form
+        self.frequency = rfftfreq(self.length, 1.0 / sample_rate)
+        """Of the filter, Hz. Shape: (frequencies,)."""
+        self.frequency[0] = self.frequency[1]  # nothing is heard of it, and formulas divide by it
+        small = _above(plate.first_mode, self.frequency) if form == "body" else 1.0
+        self.direct = small * plate.direct_pressure(self.frequency)
+        """What a floor radiates at once, at 1 m, Pa / N. Shape: (frequencies,)."""
+        spectra = small * rfft(ringing / sample_rate, self.length, axis=2)
+        self.ringing = spectra.astype(np.complex64)
+        """What rings, times the root of the area that it goes through, Pa m / N.
+
+        Shape: (places, octaves, frequencies)."""
+
+    def impulse(self, place: int) -> NDArray[np.float64]:
+        """Return what is heard of a force of one sample at 1 m from a body, Pa / N."""
+        transfer = self.direct + self.ringing[place].sum(axis=0) / np.sqrt(2.0 * np.pi)
+        return irfft(transfer, self.length)
+
+    @property
+    def squares(self) -> NDArray[np.float64]:
+        """p^2 over F^2 at 1 m from a body, Pa^2 / N^2. Shape: (places, frequencies)."""
+        heard = self.direct + self.ringing.sum(axis=1) / np.sqrt(2.0 * np.pi)
+        return np.square(np.abs(heard))
+
+    def transfer(self, distance: NDArray, place: NDArray) -> NDArray[np.complex128]:
+        """Return pressure over force by frequency, Pa / N, without the delay.
+
+        Args:
+            distance: Of the blow from the microphone, m. Shape: (n,).
+            place: Index below `PLACES` of each blow. Shape: (n,).
+
+        Returns:
+            Of the frequencies of a real transform of `length` samples. Shape: (n, frequencies).
+        """
+        apart = distance[:, None]
+        if self._form == "body":
+            spread = np.broadcast_to(1.0 / (2.0 * np.pi * apart**2), (len(apart), len(OCTAVES)))
+        else:
+            spread = self._plate.spread(OCTAVES, apart)
+        # A factor an octave: one that went with the frequency would ring before the blow.
+        size = np.sqrt(spread).astype(np.float32)
+        ringing = np.einsum("no,nof->nf", size, self.ringing[place])
+        return self.direct / apart + ringing
+
+
+@cache
+def floor_response(plate: Plate, sample_rate: int) -> PlateResponse:
+    """Return a floor's filter, made once for each sample rate."""
+    return PlateResponse(plate, sample_rate, "floor")

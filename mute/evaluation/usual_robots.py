@@ -1,0 +1,47 @@
+"""Robots as they are: each a little different, seeing with noise, pushed by nobody.
+
+All that is said of a policy is measured on the same robots, as the project's defaults have them and
+not as its task does: one that was trained on tame robots is judged on the same as any.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+from mute.controllers.learned import Policy
+from mute.envs.observations import ObservationsCfg
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.randomization import RandomizationCfg
+from mute.evaluation.trials import evaluation_cfg
+
+__all__ = ["robots_cfg", "under_conditions"]
+
+
+def under_conditions(policy: Policy) -> Policy:
+    """Return a policy whose configuration has the usual randomisation and noise."""
+    env = policy.cfg.env
+    usual = ObservationsCfg()
+    env = dataclasses.replace(
+        env,
+        observations=dataclasses.replace(
+            env.observations, noise=usual.noise, noise_level=usual.noise_level
+        ),
+        randomization=RandomizationCfg(push_interval=0.0),
+    )
+    return dataclasses.replace(policy, cfg=dataclasses.replace(policy.cfg, env=env))
+
+
+def robots_cfg(
+    policy: Policy, robots: int, seconds: float, seed: int, nominal: bool = False
+) -> QuadrupedEnvCfg:
+    """Return the environment to measure a policy in.
+
+    Args:
+        policy: What walks.
+        robots: Number of robots.
+        seconds: Longest time that they walk, s.
+        seed: Of their physics, their first states and the noise.
+        nominal: Whether all are the exact model instead, and see without noise.
+    """
+    env = under_conditions(policy).cfg.env
+    return evaluation_cfg(env, robots, seconds, seed, randomized=not nominal)
