@@ -48,6 +48,7 @@ __all__ = [
     "FLOORS",
     "FOOT_RADIUS",
     "RUBBER",
+    "USUAL_LANDING",
     "Covering",
     "Floor",
     "find_floors",
@@ -63,8 +64,8 @@ RUBBER = (3.6e6, 0.5)
 RUBBER_RESTITUTION = sqrt(0.5)
 """Rebound over approach speed of the rubber on what is hard."""
 
-_USUAL_LANDING = (0.5, 0.45)
-"""Effective mass, kg, and speed, m/s, of a landing for which MuJoCo's contact is set."""
+USUAL_LANDING = (0.5, 0.45)
+"""Effective mass, kg, and speed, m/s, of a landing that stands for all, where one must."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ class Floor:
         exp(-tan(a) (pi - 2 a)) of the speed, e^-2 at least (where the force of x'' + 2 zeta omega
         x' + omega^2 x = 0 comes to 0).
         """
-        mass, speed = _USUAL_LANDING
+        mass, speed = USUAL_LANDING
         blow = self.contact.blow(mass, speed)
         rebound = sqrt(max(1.0 - float(blow.lost) / (0.5 * mass * speed**2), exp(-3.9)))
 

@@ -20,7 +20,7 @@ from scipy.signal import oaconvolve
 
 from mute.acoustics.air import AIR_IMPEDANCE
 from mute.acoustics.contacts import ContactBlock
-from mute.acoustics.floors import Floor
+from mute.acoustics.floors import USUAL_LANDING, Floor
 from mute.acoustics.microphone import distance
 from mute.acoustics.physics.room import Room
 from mute.acoustics.sources.exposures import blow_exposures
@@ -76,14 +76,12 @@ def near_floors(floors: Sequence[Floor]) -> Nearness:
 
 _APART = np.geomspace(0.05, 50.0, 64)
 """Distances of the tables, m."""
-_USUAL_LANDING = (0.5, 0.45)
-"""Mass, kg, and speed, m/s, that the tables are of."""
 
 
 @cache
 def _floor_nearness(floor: Floor) -> NDArray[np.float64]:
     count = len(_APART)
-    mass, speed = (np.full(count, value) for value in _USUAL_LANDING)
+    mass, speed = (np.full(count, value) for value in USUAL_LANDING)
     foot = np.zeros(count, dtype=np.int64)
     places = [
         blow_exposures(floor, mass, speed, np.full(count, place), foot) for place in range(PLACES)

@@ -147,8 +147,13 @@ class Soundscape:
             Sound pressure, Pa. Shape: (num_robots, samples).
 
         Raises:
-            ValueError: If the block leaves a gap or is of another number of robots.
+            ValueError: If the block leaves a gap, is of another number of robots, or its steps are
+                shorter than a sample.
         """
+        if block.timestep * self.sample_rate < 1.0:
+            raise ValueError(
+                f"steps of {block.timestep:g} s are shorter than a sample at {self.sample_rate} Hz"
+            )
         self._clock.accept(block)
         steps = self._clock.step + np.arange(block.steps + 1)
         # Less a margin, so that a step that ends upon a sample does not, by rounding, include it.

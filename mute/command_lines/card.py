@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from mute.acoustics.body import CALIBRATION_FILE
+from mute.acoustics.soundscape import SOURCES
 from mute.command_lines.arguments import command_line, make_directory, parse
 from mute.command_lines.calibrate import REFERENCES
 from mute.command_lines.card_benchmark import BenchmarkFiles, benchmark_page
@@ -91,15 +92,18 @@ def read_results(args: CardArgs) -> ResultFiles:
         card=card,
         seeds=seeds,
         paper_task=_read(_DOCS / "go1_mute_paper.json"),
-        noise=_read(args.noise),
-        sweep_speed=_read(beside / "sweep_speed.json"),
-        sweep_beta=_read(beside / "sweep_beta.json"),
-        walk=_read(beside / "walk.json"),
+        noise=_read_rows(args.noise, *_LEVELS, *(f"laeq_{name}" for name in SOURCES)),
+        sweep_speed=_read_rows(beside / "sweep_speed.json", *_LEVELS),
+        sweep_beta=_read_rows(beside / "sweep_beta.json", *_LEVELS),
+        walk=_read(beside / "walk.json", *_WALK),
         fitted=_fitted_row(),
         calibration=file_sha256(CALIBRATION_FILE),
     )
 
 
+_LEVELS = ("robots", "surface", "beta", "mnl_mean", "mnl_ci95", "pnl_mean", "pnl_ci95")
+_WALK = ("beta", "arrived", "mnl_mean", "mnl_ci95", "pnl_mean", "pnl_ci95")
+"""What the pages tell of levels."""
 _CARD = (
     "seed",
     "figures",
@@ -180,6 +184,21 @@ def read_benchmarks(args: CardArgs) -> BenchmarkFiles:
         walking=_read(docs / "walking.json"),
         peer_walks=_read(docs / "peer_walks.json"),
     )
+
+
+def _read_rows(path: Path, *keys: str) -> Any:  # noqa: ANN401
+    """Return the rows of a table, each with these keys.
+
+    Raises:
+        MuteError: If the file is missing, or no such table.
+    """
+    rows = _read(path)
+    if not isinstance(rows, list) or not rows or not all(isinstance(row, dict) for row in rows):
+        raise MuteError(f"{path} is no table that `evaluate.py` wrote")
+    for key in keys:
+        if any(key not in row for row in rows):
+            raise MuteError(f"{path} lacks '{key}'; measure it anew")
+    return rows
 
 
 def _read(path: Path, *keys: str) -> Any:  # noqa: ANN401

@@ -130,6 +130,21 @@ def test_a_file_that_is_missing_is_named(tmp_path):
         card.main(["--card", str(tmp_path / "nowhere.json")])
 
 
+@pytest.mark.parametrize(
+    ("name", "key"), [("noise", "robots"), ("sweep_beta", "mnl_ci95"), ("walk", "mnl_mean")]
+)
+def test_levels_of_an_earlier_version_are_refused_by_what_they_lack(name, key, tmp_path):
+    for source in (REPOSITORY / "docs" / "noise").glob("*.json"):
+        (tmp_path / source.name).write_bytes(source.read_bytes())
+    path = tmp_path / f"{name}.json"
+    content = json.loads(path.read_text())
+    for row in content if isinstance(content, list) else [content]:
+        del row[key]
+    path.write_text(json.dumps(content))
+    with pytest.raises(MuteError, match=rf"{name}\.json lacks '{key}'"):
+        card.main(["--noise", str(tmp_path / "noise.json")])
+
+
 def test_a_page_that_cannot_be_written_is_told_in_one_line_and_leaves_nothing_beside(tmp_path):
     (tmp_path / "results.md").mkdir()
     with pytest.raises(MuteError, match=r"cannot write .*results\.md"):
