@@ -9,7 +9,7 @@ from places import REPOSITORY
 
 from mute.acoustics.floors import FLOORS
 
-_ROW = re.compile(r"^\| ([a-z]+) \| [^|]* " + r"\| ([\d.e-]+) " * 6 + r"\|$", re.MULTILINE)
+_ROW = re.compile(r"^\| ([a-z]+) \| [^|]* " + r"\| (\d[\d.e-]*) " * 6 + r"\|$", re.MULTILINE)
 _PAGE = (REPOSITORY / "docs" / "sound.md").read_text()
 _ROWS = {name: [*map(float, figures)] for name, *figures in _ROW.findall(_PAGE)}
 
