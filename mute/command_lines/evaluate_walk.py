@@ -46,7 +46,7 @@ from mute.support.resources import RESOURCES
 __all__ = ["WalkArgs", "walk"]
 
 
-_MOST_TRIALS = 1000
+_MOST_TRIALS = 256
 
 
 @dataclass
@@ -61,11 +61,11 @@ class WalkArgs(SoundArgs):
     """Command more than the course's speed where the robot falls behind it, as quiet ones do, so
     that different betas walk equally fast; unless given, the command is the course's speed."""
     trials: int = 16
-    """Robots that walk it, one after the other; the first is drawn and kept."""
+    """Robots that walk it, side by side; the first is drawn and kept."""
     nominal: bool = False
     """Let the exact model, which sees without noise, walk it as well."""
     seed: int = 1
-    """Seed of the first robot, of its initial state and of the noise; those after it count on."""
+    """Seed of the robots' physics, of initial states and of the noise."""
     out: Path = Path("evaluation")
     """Directory of the files that are written."""
     wav: Path | None = None
@@ -93,59 +93,44 @@ def walk(args: WalkArgs) -> None:
     torch.set_num_threads(1)
     origin = sound_origin(args.policy)
     keep = _kept_walk(args)
-    walked: list[Walk] = []
-    exact: list[Walk] = []
-    try:
-        _walk_all(args, course, policy, keep, walked, exact)
-    except KeyboardInterrupt:
-        if walked:
-            _report(args, course, walked, exact, {"iteration": policy.iteration} | origin, True)
-            tell_kept([keep])
-        raise
-    _report(args, course, walked, exact, {"iteration": policy.iteration} | origin, False)
+    walked = _walked(args, course, policy, keep, nominal=False)
+    stopped = len(walked) < args.trials
+    exact = [] if stopped or not args.nominal else _walked(args, course, policy, None, nominal=True)
+    _report(args, course, walked, exact, {"iteration": policy.iteration} | origin, stopped)
     tell_kept([keep])
+    if stopped:
+        raise KeyboardInterrupt
 
 
-def _walk_all(
-    args: WalkArgs,
-    course: Course,
-    policy: Policy,
-    keep: KeptWalks,
-    walked: list[Walk],
-    exact: list[Walk],
-) -> None:
-    """Let one robot after the other walk, and then the exact one if it is to.
+def _walked(
+    args: WalkArgs, course: Course, policy: Policy, keep: KeptWalks | None, nominal: bool
+) -> list[Walk]:
+    """Let robots walk side by side, or the exact one alone; return what came of those that ended.
 
     Args:
         args: What was asked for.
         course: Where they walk.
         policy: What walks.
         keep: What to keep of the first.
-        walked: Is given what came of each.
-        exact: Is given what came of the exact one.
+        nominal: Whether the exact model walks.
     """
-    microphone, room = find_microphone(args.microphone), find_room(args.room)
-    cases = [(args.seed + trial, False) for trial in range(args.trials)]
-    cases += [(args.seed, True)] if args.nominal else []
-    with progress_bar("walk", len(cases) * course.length) as advance:
-        for index, (seed, nominal) in enumerate(cases):
-            env = make_walk_env(policy, course, seed, nominal)
-            before = index * course.length
-            result = follow_course(
-                env,
-                LearnedController(policy, env.num_envs),
-                course,
-                args.beta,
-                seed,
-                args.hold_speed,
-                KeptWalks() if index else keep,
-                lambda done, before=before: advance(before + done),
-                microphone=microphone,
-                sources=args.sources,
-                from_energies=room.has_walls,
-                room=room,
-            )
-            (exact if nominal else walked).append(result)
+    room = find_room(args.room)
+    env = make_walk_env(policy, course, args.seed, 1 if nominal else args.trials, nominal)
+    with progress_bar("walk, exact" if nominal else "walk", course.length) as advance:
+        return follow_course(
+            env,
+            LearnedController(policy, env.num_envs),
+            course,
+            args.beta,
+            args.seed,
+            args.hold_speed,
+            keep,
+            advance,
+            microphone=find_microphone(args.microphone),
+            sources=args.sources,
+            from_energies=room.has_walls,
+            room=room,
+        )
 
 
 def _report(

@@ -1,6 +1,6 @@
-"""The long walk: one robot follows a course over several floors and is heard all the way.
+"""The long walk: robots follow a course over several floors and are heard all the way.
 
-The paper's experiment in an office. The robot is told where it is, as by a perfect odometry; what
+The paper's experiment in an office. A robot is told where it is, as by a perfect odometry; what
 drives it knows nothing of the course but the velocity commands. All levels are modelled.
 """
 
@@ -22,16 +22,15 @@ from mute.acoustics.metering.levels import READINGS_PER_SECOND
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.physics.room import OPEN, Room
 from mute.acoustics.soundscape import SOURCES
-from mute.controllers.command import Command
+from mute.acoustics.tally import HeardLevels
 from mute.controllers.controller import Controller
 from mute.controllers.learned import Policy
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.scene import FloorPatch
 from mute.evaluation.course.course import Course
 from mute.evaluation.course.path_following import PathFollower, SpeedHold
-from mute.evaluation.gait import Gait
+from mute.evaluation.gait import Gait, GaitMeter
 from mute.evaluation.noise_levels import SETTLE_TIME
-from mute.evaluation.session import Session
 from mute.evaluation.usual_robots import robots_cfg
 from mute.rendering.kept_walks import KeptWalks, filming
 
@@ -146,18 +145,24 @@ def time_limit(course: Course) -> float:
     return 10.0 + 2.0 * course.length / course.speed
 
 
-def make_walk_env(policy: Policy, course: Course, seed: int, nominal: bool = False) -> QuadrupedEnv:
-    """Return an environment for one robot on the floors of a course, facing along +x.
+def make_walk_env(
+    policy: Policy, course: Course, seed: int, robots: int = 1, nominal: bool = False
+) -> QuadrupedEnv:
+    """Return an environment of robots on the floors of a course, each alone, facing along +x.
 
     Args:
         policy: What walks.
         course: What lies on the ground.
-        seed: Of the robot's physics, its initial state and its noise.
-        nominal: Whether it is the exact model instead, and sees without noise.
+        seed: Of the robots' physics, their initial states and their noise.
+        robots: How many.
+        nominal: Whether they are the exact model instead, and see without noise.
     """
-    measured = robots_cfg(policy, 1, time_limit(course), seed, nominal)
+    measured = robots_cfg(policy, robots, time_limit(course), seed, nominal)
     heard = listening_cfg(measured, patches=_patches(course))
-    return QuadrupedEnv(dataclasses.replace(heard, random_heading=False, num_threads=1))
+    threads = 1 if robots == 1 else 0
+    return QuadrupedEnv(
+        dataclasses.replace(heard, random_heading=False, num_threads=threads)
+    )
 
 
 def follow_course(
@@ -173,8 +178,12 @@ def follow_course(
     sources: Sequence[str] = SOURCES,
     from_energies: bool = False,
     room: Room = OPEN,
-) -> Walk:
+) -> list[Walk]:
     """Walk a course from its start to its end, to a fall or the like, or to the time limit.
+
+    Robots walk side by side, each in a world of its own. One whose walk has ended is asked to
+    stand, and all that comes after is left out of its figures. Where an interrupt comes between,
+    the walks that have ended are returned, if there are any.
 
     Args:
         env: What `make_walk_env` returns for the course; it is reset first.
@@ -182,27 +191,31 @@ def follow_course(
         course: Where to walk.
         beta: Quiet factor.
         seed: Seed of all noise in the sound.
-        hold_speed: Ask for more where the robot falls behind the course's speed; otherwise the
+        hold_speed: Ask for more where a robot falls behind the course's speed; otherwise the
             commands are never above it, whatever becomes of them.
-        keep: What to keep of the robot, of index 0, from `SETTLE_TIME` on.
-        on_progress: Called before every step with the length of the path left behind, m.
+        keep: What to keep of the first robot, of index 0, from `SETTLE_TIME` on, until all have
+            ended.
+        on_progress: Called before every step with the length of the path that the last one has
+            left behind, m.
         microphone: Where to listen. Default: on the trunk.
         sources: What to hear, of `soundscape.SOURCES`.
         from_energies: Take the levels from energies, without sound that no file wants: quicker, but
             with peaks that are up to 1 dB off, see `mute.acoustics.energy`.
         room: Where it is heard. Sound of one with walls needs pyroomacoustics.
 
+    Returns:
+        What came of each robot.
+
     Raises:
+        KeyboardInterrupt: If that came before any walk had ended.
         MuteError: If a file cannot be written, nothing renders, or what a room needs is missing.
     """
     env.autoreset = False  # a fall ends the walk, and leaves the robot where it fell
-    follower = PathFollower(course.path, course.speed)
-    hold = SpeedHold(env.step_dt)
-    session = Session(env, controller, Command(vx=0.0, beta=beta))
-    places = [_place(env)]
-    deviation, commanded = 0.0, 0.0
-    end: End = "time limit"
+    robots = [_Robot(course, env.step_dt, hold_speed) for _ in range(env.num_envs)]
     kept = keep or KeptWalks()
+    env.reset()
+    controller.reset()
+    meter = GaitMeter(env, SETTLE_TIME)
     with (
         filming(env, kept, SETTLE_TIME) as films,
         Listener(
@@ -218,47 +231,125 @@ def follow_course(
             room=room,
         ) as listener,
     ):
-        for _ in range(round(time_limit(course) / env.step_dt)):
-            vx, vy, wz = follower.command(*places[-1])
-            if on_progress is not None:
-                on_progress(follower.progress)
-            deviation = max(deviation, follower.deviation)
-            if follower.finished:
-                end = "arrived"
-                break
-            if hold_speed:
-                vx = hold.raised(vx, follower.progress)
-            commanded += vx
-            session.set_command(Command(vx, vy, wz, beta))
-            session.step()
-            dones = env.fallen | env.unstable
-            listener.listen(dones)
-            films.record()
-            if bool(dones[0]):
-                end = "fell" if bool(env.fallen[0]) else "unstable"
-                break
-            places.append(_place(env))
+        try:
+            for _ in range(round(time_limit(course) / env.step_dt)):
+                commands = _commands(env, robots, beta)
+                if on_progress is not None:
+                    on_progress(min(robot.follower.progress for robot in robots))
+                _close(robots, env, meter, listener, course)
+                if all(robot.walk for robot in robots):
+                    break
+                env.set_command(commands)
+                _, _, dones, _ = env.step(controller.act(env.get_observations()))
+                meter.update(commands, dones)
+                listener.listen(env.fallen | env.unstable)
+                films.record()
+                for index, robot in enumerate(robots):
+                    robot.steps += 1
+                    if robot.end is None and bool(env.fallen[index] | env.unstable[index]):
+                        robot.end = "fell" if bool(env.fallen[index]) else "unstable"
+            for robot in robots:
+                robot.end = robot.end or "time limit"
+            _close(robots, env, meter, listener, course)
+        except KeyboardInterrupt:
+            if not any(robot.walk for robot in robots):
+                raise
     kept.note_clipped(listener.clipped)
-    xy = np.array(places)[:, :2]
-    track = _track(listener, course, xy, env.step_dt)
-    distance = _distance(xy, env.step_dt)
-    seconds = session.seconds
-    levels = listener.levels()[0]
+    return [robot.walk for robot in robots if robot.walk is not None]
+
+
+class _Robot:
+    """One robot on its way."""
+
+    def __init__(self, course: Course, step_dt: float, hold_speed: bool) -> None:
+        self.follower = PathFollower(course.path, course.speed)
+        self._hold = SpeedHold(step_dt) if hold_speed else None
+        self.places: list[tuple[float, float]] = []
+        self.deviation, self.commanded = 0.0, 0.0
+        self.steps = 0
+        self.end: End | None = None
+        self.walk: Walk | None = None
+        """What came of it, once it has ended."""
+
+    def command(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
+        """Return what to ask of it where it is; once its walk has ended, to stand."""
+        if self.end is not None:
+            return 0.0, 0.0, 0.0
+        self.places.append((x, y))
+        vx, vy, wz = self.follower.command(x, y, yaw)
+        self.deviation = max(self.deviation, self.follower.deviation)
+        if self.follower.finished:
+            self.end = "arrived"
+            return 0.0, 0.0, 0.0
+        if self._hold is not None:
+            vx = self._hold.raised(vx, self.follower.progress)
+        self.commanded += vx
+        return vx, vy, wz
+
+
+def _commands(env: QuadrupedEnv, robots: Sequence[_Robot], beta: float) -> torch.Tensor:
+    """Return what to ask of each robot now. Shape: (num_envs, 4)."""
+    forward = env.heading
+    yaws = torch.atan2(forward[:, 1], forward[:, 0]).tolist()
+    places = zip(env.base_pos[:, :2].tolist(), yaws, strict=True)
+    asked = [
+        (*robot.command(x, y, yaw), beta)
+        for robot, ((x, y), yaw) in zip(robots, places, strict=True)
+    ]
+    return torch.tensor(asked)
+
+
+def _close(
+    robots: Sequence[_Robot],
+    env: QuadrupedEnv,
+    meter: GaitMeter,
+    listener: Listener,
+    course: Course,
+) -> None:
+    """Take the figures of robots whose walk has just ended."""
+    ended = [index for index, robot in enumerate(robots) if robot.end and robot.walk is None]
+    if not ended:
+        return
+    listener.level()  # works off what is left of the last stretch
+    levels, readings, times = listener.levels(), listener.readings(), listener.reading_times()
+    for index in ended:
+        chosen = torch.arange(env.num_envs) == index
+        gait = dataclasses.replace(meter.gait(chosen), power=levels[index].power)
+        robots[index].walk = _walk(
+            robots[index], env.step_dt, course, levels[index], gait, times, readings[index]
+        )
+
+
+def _walk(
+    robot: _Robot,
+    step_dt: float,
+    course: Course,
+    levels: HeardLevels,
+    gait: Gait,
+    times: NDArray[np.float64],
+    readings: NDArray[np.float64],
+) -> Walk:
+    """Return what came of a robot's walk, which has just ended."""
+    assert robot.end is not None
+    xy = np.array(robot.places)
+    track = _track(times, readings, course, xy, step_dt)
+    distance = _distance(xy, step_dt)
+    seconds = robot.steps * step_dt
     return Walk(
-        end=end,
+        end=robot.end,
         position=(float(xy[-1, 0]), float(xy[-1, 1])),
         seconds=seconds,
-        progress=follower.progress,
-        path_length=follower.length,
+        progress=robot.follower.progress,
+        path_length=robot.follower.length,
         distance=distance,
         speed_mean=distance / seconds,
-        command_mean=commanded / session.steps,
-        deviation_max=deviation,
+        command_mean=robot.commanded / robot.steps,
+        deviation_max=robot.deviation,
         mnl=levels.mnl,
         pnl=levels.pnl,
         laeq=levels.laeq,
         floors=_by_floor(track),
-        gait=dataclasses.replace(session.gait(), power=levels.power),
+        gait=gait,
         track=track,
     )
 
@@ -270,22 +361,20 @@ def _patches(course: Course) -> tuple[FloorPatch, ...]:
     )
 
 
-def _place(env: QuadrupedEnv) -> tuple[float, float, float]:
-    """Return where the robot is: x and y in m, and yaw in rad."""
-    x, y = env.base_pos[0, :2].tolist()
-    forward = env.heading[0]
-    return x, y, float(torch.atan2(forward[1], forward[0]))
-
-
-def _track(listener: Listener, course: Course, xy: NDArray[np.float64], step_dt: float) -> Track:
+def _track(
+    times: NDArray[np.float64],
+    readings: NDArray[np.float64],
+    course: Course,
+    xy: NDArray[np.float64],
+    step_dt: float,
+) -> Track:
     """Join the levels with the places, interpolated between the control steps."""
-    level = listener.readings()[0]
-    counted = ~np.isnan(level)
-    time = listener.reading_times()[counted]
+    counted = ~np.isnan(readings)
+    time = times[counted]
     known = np.arange(len(xy)) * step_dt
     x, y = (np.interp(time, known, column) for column in xy.T)
     floor = np.array(course.floor_names)[course.floor_at(np.stack((x, y), axis=-1))]
-    return Track(time, x, y, floor, level[counted])
+    return Track(time, x, y, floor, readings[counted])
 
 
 def _distance(xy: NDArray[np.float64], step_dt: float) -> float:

@@ -18,7 +18,7 @@ from mute.command_lines.evaluate_walk import _story
 from mute.controllers import LearnedController, load_policy
 from mute.evaluation.course.course import Course, FloorArea
 from mute.evaluation.course.long_walk import Walk, follow_course, make_walk_env, time_limit
-from mute.evaluation.session import Session
+from mute.evaluation.gait import GaitMeter
 from mute.rendering.kept_walks import KeptWalks
 
 POLICY = SHIPPED_POLICY
@@ -37,9 +37,9 @@ class _Falling:
     """Drives with a policy, and turns the robot on its back at a step, or does worse."""
 
     def __init__(self, env, step, qpos=(0.0, 1.0, 0.0, 0.0)):
-        self._learned = LearnedController(load_policy(POLICY), 1)
+        self._learned = LearnedController(load_policy(POLICY), env.num_envs)
         self._env, self._step, self._qpos = env, step, torch.tensor(qpos)
-        self.num_envs = 1
+        self.num_envs = env.num_envs
 
     def reset(self, mask=None):
         self._learned.reset(mask)
@@ -54,7 +54,8 @@ class _Falling:
 def _walk(course, beta=0.0, seed=1, **options) -> Walk:
     policy = load_policy(POLICY)
     env = make_walk_env(policy, course, seed)
-    return follow_course(env, LearnedController(policy, 1), course, beta, seed=seed, **options)
+    [walk] = follow_course(env, LearnedController(policy, 1), course, beta, seed=seed, **options)
+    return walk
 
 
 @pytest.fixture(scope="module")
@@ -101,10 +102,12 @@ def test_levels_from_energies_are_near_those_of_the_sound(walk):
 
 
 def test_the_power_is_not_sampled_at_the_control_rate(monkeypatch):
-    sampled = Session.gait
-    monkeypatch.setattr(Session, "gait", lambda own: replace(sampled(own), power=math.nan))
+    sampled = GaitMeter.gait
+    monkeypatch.setattr(
+        GaitMeter, "gait", lambda own, chosen: replace(sampled(own, chosen), power=math.nan)
+    )
     env = make_walk_env(load_policy(POLICY), STRAIGHT, seed=1)
-    result = follow_course(env, _Falling(env, step=75), STRAIGHT, beta=0.0, from_energies=True)
+    [result] = follow_course(env, _Falling(env, step=75), STRAIGHT, beta=0.0, from_energies=True)
     assert 10.0 < result.gait.power < 50.0
 
 
@@ -142,17 +145,57 @@ def test_the_physics_of_a_walk_runs_at_a_millisecond_on_the_floors_of_the_course
 
 def test_a_fall_ends_the_walk_where_the_robot_fell():
     env = make_walk_env(load_policy(POLICY), STRAIGHT, seed=1)
-    result = follow_course(env, _Falling(env, step=120), STRAIGHT, beta=0.0)
+    [result] = follow_course(env, _Falling(env, step=120), STRAIGHT, beta=0.0)
     assert (result.end, result.falls) == ("fell", 1)
     assert 0.6 < result.position[0] == pytest.approx(result.progress, abs=0.05)
     assert result.seconds == pytest.approx(120 * 0.02, abs=0.1)
     assert result.track.time[-1] <= result.seconds
 
 
+def test_each_walk_ends_by_itself_and_what_comes_after_is_none_of_its_figures():
+    env = make_walk_env(load_policy(POLICY), STRAIGHT, seed=1, robots=2)
+    fallen, arrived = follow_course(env, _Falling(env, step=120), STRAIGHT, beta=0.0)
+    assert (fallen.end, arrived.end) == ("fell", "arrived")
+    assert fallen.seconds == pytest.approx(120 * 0.02, abs=0.1)
+    assert arrived.seconds > fallen.seconds + 0.3
+    for walk in (fallen, arrived):
+        assert walk.track.time[-1] == pytest.approx(walk.seconds, abs=0.1)
+        assert walk.mnl == pytest.approx(walk.track.level.mean())
+    assert (fallen.gait.fall_rate, arrived.gait.fall_rate) == (1.0, 0.0)
+    assert fallen.mnl != arrived.mnl
+
+
+def test_an_interrupt_leaves_the_walks_that_have_ended(monkeypatch):
+    env = make_walk_env(load_policy(POLICY), STRAIGHT, seed=1, robots=2)
+
+    def stop(progress: float) -> None:
+        if progress > 0.6:  # of the one that is behind, and has not fallen
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        controller = LearnedController(load_policy(POLICY), 2)
+        follow_course(env, controller, STRAIGHT, beta=0.0, on_progress=stop)
+    falling = _Falling(env, step=20)
+    [walk] = follow_course(env, falling, STRAIGHT, beta=0.0, on_progress=_Counting(60))
+    assert walk.end == "fell"
+
+
+class _Counting:
+    """Interrupts at the n-th step."""
+
+    def __init__(self, left: int) -> None:
+        self._left = left
+
+    def __call__(self, _: float) -> None:
+        self._left -= 1
+        if not self._left:
+            raise KeyboardInterrupt
+
+
 def test_a_simulation_that_blows_up_ends_the_walk_and_is_no_fall(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its log of warnings into the working directory
     env = make_walk_env(load_policy(POLICY), STRAIGHT, seed=1)
-    result = follow_course(env, _Falling(env, step=20, qpos=math.nan), STRAIGHT, beta=0.0)
+    [result] = follow_course(env, _Falling(env, step=20, qpos=math.nan), STRAIGHT, beta=0.0)
     assert (result.end, result.falls) == ("unstable", 0)
     assert (result.gait.unstable, result.gait.fall_rate) == (1, 0.0)
     assert result.seconds == pytest.approx(20 * 0.02)
@@ -163,7 +206,7 @@ def test_a_fall_before_the_first_reading_has_no_level_and_no_sound(tmp_path):
     env = make_walk_env(load_policy(POLICY), STRAIGHT, seed=1)
     notes = []
     keep = KeptWalks({0: tmp_path / "fall.wav"}, on_note=notes.append)
-    result = follow_course(env, _Falling(env, step=5), STRAIGHT, beta=0.0, keep=keep)
+    [result] = follow_course(env, _Falling(env, step=5), STRAIGHT, beta=0.0, keep=keep)
     assert list(tmp_path.iterdir()) == []
     assert "fall.wav is not written: the walk ended before" in notes[0]
     assert result.end == "fell"
