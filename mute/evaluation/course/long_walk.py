@@ -160,9 +160,7 @@ def make_walk_env(
     measured = robots_cfg(policy, robots, time_limit(course), seed, nominal)
     heard = listening_cfg(measured, patches=_patches(course))
     threads = 1 if robots == 1 else 0
-    return QuadrupedEnv(
-        dataclasses.replace(heard, random_heading=False, num_threads=threads)
-    )
+    return QuadrupedEnv(dataclasses.replace(heard, random_heading=False, num_threads=threads))
 
 
 def follow_course(
