@@ -119,7 +119,7 @@ def test_randomised_robots_stand_in_silence_and_take_a_push(exam):
     assert exam["robots still again 3 s after a push, at the worst beta"] >= 0.8
     assert exam["joint speed without noise, at the worst beta"] <= 0.04
     # Where sensors are noisy torques change their signs in a stand, and gears are heard.
-    assert exam["level at the trunk, at the worst beta"] <= 60.0
+    assert exam["level at the trunk, at the worst beta"] <= 61.0
 
 
 @pytest.mark.parametrize("speed", [0.3, 0.5, 0.8])
