@@ -42,11 +42,11 @@ from mute.acoustics.physics.contact import (
     series_modulus,
 )
 from mute.acoustics.physics.plate import Layer, Plate, bonded
+from mute.envs.scene import FOOT_RADIUS
 from mute.support.ranges import Range, check_number
 
 __all__ = [
     "FLOORS",
-    "FOOT_RADIUS",
     "RUBBER",
     "USUAL_LANDING",
     "Covering",
@@ -54,9 +54,6 @@ __all__ = [
     "find_floors",
     "register_floor",
 ]
-
-FOOT_RADIUS = 0.023
-"""Of the rubber foot, m."""
 
 RUBBER = (3.6e6, 0.5)
 """Young's modulus of the foot, Pa, and its Poisson's ratio."""

@@ -11,7 +11,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from mute.command_lines.card_reliability import TRAINING, SeedFiles, reliability_section, unmet
-from mute.command_lines.card_tables import markdown, mean_and_spread, spread_of_trials, times
+from mute.command_lines.card_tables import (
+    markdown,
+    mean_and_spread,
+    spread_of_trials,
+    times,
+    usual_rows,
+)
 from mute.evaluation.matched_speed import level_at_speed
 from mute.evaluation.paper_levels import PAPER_LEVELS
 
@@ -128,7 +134,7 @@ def summary(files: ResultFiles) -> str:
     """Return the table that also stands on the front page, and what it is of."""
     runs = list(files.gaits.values())
     robots = sum(run["trials"] for run in runs)
-    levels = {row["beta"]: row for row in _usual(files.noise) if row["surface"] == "wood"}
+    levels = {row["beta"]: row for row in usual_rows(files.noise) if row["surface"] == "wood"}
     rows = []
     for index, row in enumerate(runs[0]["range"]):
         beta = row["beta"]
@@ -238,7 +244,7 @@ def _first_walk(files: ResultFiles) -> str:
 
 
 def _noise(files: ResultFiles) -> str:
-    noise = _usual(files.noise)
+    noise = usual_rows(files.noise)
     return (
         "## Noise\n\n"
         f"Modelled noise at the trunk, {noise[0]['command_speed']:g} m/s commanded, "
@@ -271,11 +277,6 @@ def _exact_robots(noise: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _usual(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return the rows of robots as they are."""
-    return [row for row in rows if row["robots"] == "different"]
-
-
 def _paper_task(files: ResultFiles) -> str:
     card, paper = files.card, files.paper_task
     loud, quiet = paper["at_speed"][0], paper["at_speed"][-1]
@@ -297,7 +298,7 @@ def _paper_task(files: ResultFiles) -> str:
 
 
 def _shortcomings(files: ResultFiles) -> str:
-    noise = _usual(files.noise)
+    noise = usual_rows(files.noise)
     quiet = next(row for row in noise if row["surface"] == "wood" and row["beta"] == 1.0)
     same_speed = _drops_at_speed(files.sweep_speed)
     same_command = _drops_at_command(files.sweep_speed)
@@ -377,7 +378,7 @@ def _drops_at_speed(sweep: Sequence[Mapping[str, Any]]) -> dict[float, float]:
     compare.
     """
     loud, quiet = (
-        [(row["speed_mean"], row["mnl_mean"]) for row in _usual(sweep) if row["beta"] == beta]
+        [(row["speed_mean"], row["mnl_mean"]) for row in usual_rows(sweep) if row["beta"] == beta]
         for beta in (0.0, 1.0)
     )
     drops = {
@@ -397,7 +398,7 @@ def _told_by_speed(drops: Mapping[float, float]) -> str:
 def _drops_at_command(sweep: Sequence[Mapping[str, Any]]) -> list[float]:
     """Return by how much the mean level falls from beta 0 to 1 at every command, dB."""
     loud, quiet = (
-        {row["command_speed"]: row["mnl_mean"] for row in _usual(sweep) if row["beta"] == beta}
+        {row["command_speed"]: row["mnl_mean"] for row in usual_rows(sweep) if row["beta"] == beta}
         for beta in (0.0, 1.0)
     )
     return [level - quiet[command] for command, level in loud.items()]

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from mute.command_lines.card_tables import markdown
+from mute.command_lines.card_tables import markdown, usual_rows
+from mute.evaluation.intervals import with_interval
 from mute.evaluation.paper_levels import PAPER_AT_08, PAPER_LEVELS, PAPER_WALK
 from mute.support.errors import MuteError
 
@@ -61,7 +62,7 @@ def predicted_and_measured(
     Raises:
         MuteError: If one lacks what the part is made of.
     """
-    usual = {(row["surface"], row["beta"]): row for row in noise if row["robots"] == "different"}
+    usual = {(row["surface"], row["beta"]): row for row in usual_rows(noise)}
     rows = [
         _row(method, surface, usual.get((surface, _METHODS.get(method))), fitted)
         for method, levels in PAPER_LEVELS.items()
@@ -73,7 +74,7 @@ def predicted_and_measured(
         raise MuteError("the levels of evaluate.py noise hold no row to predict")
     mnl = _root_mean_square([row["mnl_error"] for row in predicted])
     pnl = _root_mean_square([row["pnl_error"] for row in measured])
-    fast = {row["beta"]: row for row in sweep_beta if row["robots"] == "different"}
+    fast = {row["beta"]: row for row in usual_rows(sweep_beta)}
     return "\n\n".join(
         (
             f"Asked for 0.5 m/s, {noise[0]['trials']} robots, dBA at the trunk, with the 95 % "
@@ -216,9 +217,7 @@ def _row(
 def _with_interval(row: Mapping[str, Any], name: str) -> str:
     """Return a mean level with its 95 % interval, where there is one."""
     mean, half_width = row[f"{name}_mean"], row[f"{name}_ci95"]
-    if mean is None:
-        return "-"
-    return f"{mean:.1f}" if half_width is None else f"{mean:.1f} ± {half_width:.1f}"
+    return "-" if mean is None else with_interval(mean, half_width)
 
 
 def _off(error: float) -> str:

@@ -6,7 +6,14 @@ import statistics
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["cut_short", "markdown", "mean_and_spread", "spread_of_trials", "times"]
+__all__ = [
+    "cut_short",
+    "markdown",
+    "mean_and_spread",
+    "spread_of_trials",
+    "times",
+    "usual_rows",
+]
 
 
 def markdown(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, tuple[str, str]]) -> str:
@@ -62,3 +69,8 @@ def spread_of_trials(row: Mapping[str, Any], name: str) -> str | None:
 def times(value: float | None, factor: float) -> float | None:
     """Return a value in another unit; what is missing stays so."""
     return None if value is None else factor * value
+
+
+def usual_rows(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return the rows of a table of levels that are of robots as they are."""
+    return [row for row in rows if row["robots"] == "different"]

@@ -290,20 +290,11 @@ def _report(
     }
     write_json(args.out / f"{name}_about.json", about)
     usual = [row for row in rows if row.robots == "different"]
-    _warn_of_few(usual)
+    warn_if_not_known_well(*(row.mnl_ci95 for row in usual))
     figures = draw(usual, args.out) if draw else []
     data = [f"{name}.json", f"{name}.csv", f"{name}_about.json"]
     names = [*data, *(path.name for path in figures)]
     print(f"written to {args.out}: {', '.join(names)}")
-
-
-def _warn_of_few(rows: Sequence[NoiseRow]) -> None:
-    """Say where so few robots walked that a mean level is not known well."""
-    warn_if_not_known_well(max((row.mnl_ci95 for row in rows), default=0.0, key=_or_zero))
-
-
-def _or_zero(value: float) -> float:
-    return value if math.isfinite(value) else 0.0
 
 
 def _shown(row: NoiseRow) -> dict[str, str]:

@@ -35,7 +35,7 @@ from mute.controllers import LearnedController
 from mute.controllers.learned import Policy
 from mute.evaluation.course.course import Course, load_course
 from mute.evaluation.course.long_walk import Walk, follow_course, make_walk_env
-from mute.evaluation.intervals import mean_with_interval
+from mute.evaluation.intervals import mean_with_interval, with_interval
 from mute.evaluation.plotting import check_matplotlib
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.rendering.kept_walks import KeptWalks
@@ -154,7 +154,9 @@ def _report(
     print(_story(walked[0], course))
     over = _over_all(walked) | {"stopped": stopped}
     if len(walked) > 1:
-        mnl, pnl = (_with_interval(over, name) for name in ("mnl", "pnl"))
+        mnl, pnl = (
+            with_interval(over[f"{name}_mean"], over[f"{name}_ci95"]) for name in ("mnl", "pnl")
+        )
         warn_if_not_known_well(over["mnl_ci95"])
         print(f"{over['arrived']} of {len(walked)} arrived: MNL {mnl}, PNL {pnl} dBA, modelled")
     over["nominal"] = [one.figures() for one in exact]
@@ -173,11 +175,6 @@ def _over_all(walked: Sequence[Walk]) -> dict[str, Any]:
         mean, deviation, half_width = mean_with_interval(heard)
         over |= {f"{name}_mean": mean, f"{name}_std": deviation, f"{name}_ci95": half_width}
     return over
-
-
-def _with_interval(over: Mapping[str, Any], name: str) -> str:
-    mean, half_width = over[f"{name}_mean"], over[f"{name}_ci95"]
-    return f"{mean:.1f}" if math.isnan(half_width) else f"{mean:.1f} ± {half_width:.1f}"
 
 
 def _kept_walk(args: WalkArgs) -> KeptWalks:

@@ -225,15 +225,16 @@ def tell(note: str) -> None:
     print(note, file=sys.stderr)
 
 
-def warn_if_not_known_well(half_width: float) -> None:
+def warn_if_not_known_well(*half_widths: float) -> None:
     """Say where so few robots walked that a mean level is not known well.
 
     Args:
-        half_width: Of the 95 % interval of an MNL, dB; NaN, of a single robot, is let be.
+        half_widths: Of the 95 % intervals of MNL, dB; NaN, of a single robot, is let be.
     """
-    if half_width > _KNOWN_WELL:
+    wide = [half_width for half_width in half_widths if half_width > _KNOWN_WELL]
+    if wide:
         tell(
-            f"the 95 % interval of an MNL is up to ±{half_width:.1f} dB; more --trials make it "
+            f"the 95 % interval of an MNL is up to ±{max(wide):.1f} dB; more --trials make it "
             "narrower"
         )
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from scipy.stats import quantile_test, t
 
-__all__ = ["LEVEL", "MedianInterval", "mean_with_interval", "median_interval"]
+__all__ = ["LEVEL", "MedianInterval", "mean_with_interval", "median_interval", "with_interval"]
 
 LEVEL = 0.95
 """Confidence level of an interval."""
@@ -30,6 +30,12 @@ def mean_with_interval(values: Sequence[float]) -> tuple[float, float, float]:
     deviation = math.sqrt(sum((value - mean) ** 2 for value in values) / (count - 1))
     half_width = float(t.ppf(0.5 + 0.5 * LEVEL, count - 1)) * deviation / count**0.5
     return mean, deviation, half_width
+
+
+def with_interval(mean: float, half_width: float | None) -> str:
+    """Return a level with its interval in words, and alone where there is none (None or NaN)."""
+    known = half_width is not None and not math.isnan(half_width)
+    return f"{mean:.1f} ± {half_width:.1f}" if known else f"{mean:.1f}"
 
 
 @dataclass(frozen=True)

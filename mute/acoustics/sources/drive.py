@@ -286,10 +286,10 @@ class DriveExposure:
             sample_rate: Hz.
             transmissibility: Share of a force that comes to the shell.
         """
-        impulse = transmissibility * shell_response(sample_rate).impulse(0)
-        self._frequency = np.fft.rfftfreq(len(impulse), 1.0 / sample_rate)[1:]
+        shell = shell_response(sample_rate)
+        self._frequency = shell.frequency[1:]
         weight = 10.0 ** (a_weighting_db(self._frequency) / 10.0)
-        self._heard = weight * np.square(np.abs(np.fft.rfft(impulse)))[1:]
+        self._heard = weight * transmissibility**2 * shell.squares[0, 1:]
         """A-weighted p^2 over F^2 at 1 m by frequency, Pa^2 / N^2."""
         self._pulses = np.array([self._pulse(joint) for joint in range(3)])
         self._teeth = Teeth(num_robots)

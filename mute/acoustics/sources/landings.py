@@ -87,7 +87,8 @@ class LandingSound:
         self._sample_rate = sample_rate
         self._floors = floors
         self._floor_heard, self._share = floor_heard, transmissibility
-        self._responses = [floor_response(floor.plate, sample_rate) for floor in floors]
+        heard = floors if floor_heard else ()
+        self._responses = [floor_response(floor.plate, sample_rate) for floor in heard]
         self._shell = shell_response(sample_rate)
         self._pending = Pending(num_robots)
 

@@ -13,7 +13,6 @@ import pytest
 from mute.acoustics import floors
 from mute.acoustics.floors import (
     FLOORS,
-    FOOT_RADIUS,
     RUBBER,
     Covering,
     Floor,
@@ -22,6 +21,7 @@ from mute.acoustics.floors import (
 )
 from mute.acoustics.physics.contact import hertz_duration, hertz_stiffness, series_modulus
 from mute.acoustics.physics.plate import Layer, bonded
+from mute.envs.scene import FOOT_RADIUS
 
 MASS, SPEED = 0.5, 0.45
 """Of a landing, kg and m/s."""
