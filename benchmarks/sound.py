@@ -2,7 +2,7 @@
 
 The policy that ships walks on wood. The whole is what `evaluate.py noise` does. Of its parts are
 timed: to find landings and sliding in the physics, to make and measure the sound, and, for one
-robot, to have levels without sound. What is timed happens once, as it does in use. A walk of twice
+robot, to have levels without sound. A walk of twice
 the length, in a process of its own as the first one, shows whether memory grows with it.
 """
 
@@ -14,21 +14,25 @@ configure_threads()  # before torch is imported
 
 import dataclasses
 import json
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import torch
 from rich.progress import track
 
 from mute.acoustics.audible_env import make_listening_env
 from mute.acoustics.contacts import ContactBlock
 from mute.acoustics.energy import EnergyMeter
-from mute.acoustics.listener import SAMPLE_RATE
+from mute.acoustics.floors import FLOORS
+from mute.acoustics.listener import SAMPLE_RATE, SILENT_STRETCH, STRETCH
 from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
 from mute.acoustics.recorder import Recorder
 from mute.acoustics.soundscape import Soundscape
+from mute.acoustics.sources.exposures import blow_exposures
 from mute.command_lines.arguments import (
     check_trials,
     command_line,
@@ -51,11 +55,11 @@ from mute.tasks import DEFAULT_TASK
 __all__ = ["Part", "SoundBenchmarkArgs", "Times", "measure"]
 
 _FLOOR = "wood"
+_OTHER_FLOOR = "tile"
+"""Whose table is timed: that of the other is there by then."""
 _SPEED = 0.5
 """Commanded speed at beta = 0, m/s, as in the calibration."""
 _SEED = 1
-_STRETCH = 0.5
-"""Time that is worked on at once, s, as in a `Listener`."""
 
 
 @dataclass
@@ -98,6 +102,9 @@ class Times:
 
     parts: list[Part]
     """Its parts, the whole first."""
+    table: float
+    """What the table of a floor takes, from which its levels without sound come, once in a process,
+    s."""
     memory_mb: float
     """Largest memory of the process after the whole, MB."""
 
@@ -122,18 +129,19 @@ def measure(policy_file: str, trials: int, seconds: float, whole_alone: bool) ->
     parts = [part("whole", trials, time.perf_counter() - start)]
     memory = peak_memory_mb()
     if whole_alone:
-        return Times(parts, memory)
+        return Times(parts, math.nan, memory)
+    table = _table_time()
     soundscape = Soundscape(trials, [_FLOOR], sample_rate=SAMPLE_RATE, seed=_SEED)
     meter = SoundLevelMeter(SAMPLE_RATE, trials)
     finding, hearing, _ = _walk(
-        policy, trials, simulated, lambda block: meter.update(soundscape.render(block))
+        policy, trials, simulated, STRETCH, lambda block: meter.update(soundscape.render(block))
     )
     parts += [part("recorder", trials, finding), part("sound", trials, hearing)]
     energies = EnergyMeter(1, [_FLOOR])
-    finding, hearing, walking = _walk(policy, 1, simulated, energies.update)
+    finding, hearing, walking = _walk(policy, 1, simulated, SILENT_STRETCH, energies.update)
     parts += [part("lone recorder", 1, finding), part("lone energies", 1, hearing)]
     parts.append(part("lone walk", 1, walking))
-    return Times(parts, memory)
+    return Times(parts, table, memory)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -160,6 +168,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "seconds": args.seconds,
         "machine": machine_kind(),
         "parts": [dataclasses.asdict(part) for part in once.parts],
+        "table": once.table,
         "memory_mb": once.memory_mb,
         "memory_growth_mb": twice.memory_mb - once.memory_mb,
     }
@@ -169,6 +178,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(json.dumps(content))
     else:
         print_table(content["machine"], content["parts"], list(Part.__annotations__))
+        print(f"table of a floor, once in a process: {content['table']:.2f} s")
         print(
             f"memory of the whole: {content['memory_mb']:.0f} MB; for twice the seconds "
             f"{content['memory_growth_mb']:+.0f} MB"
@@ -176,13 +186,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _table_time() -> float:
+    """Return what the table of a floor takes, s, in a process that has heard others before."""
+    one = np.ones(1)
+    first = np.zeros(1, dtype=np.int64)
+    begin = time.perf_counter()
+    blow_exposures(FLOORS[_OTHER_FLOOR], one, one, first, first)
+    return time.perf_counter() - begin
+
+
 def _walk(
-    policy: Policy, robots: int, simulated: float, hear: Callable[[ContactBlock], object]
+    policy: Policy,
+    robots: int,
+    simulated: float,
+    stretch: float,
+    hear: Callable[[ContactBlock], object],
 ) -> tuple[float, float, float]:
     """Walk, and return the times of the recorder, of `hear`, and of everything, s."""
     env = make_listening_env(robots_cfg(policy, robots, simulated, _SEED), _FLOOR)
     recorder = Recorder(env)
-    steps, at_once = round(simulated / env.step_dt), round(_STRETCH / env.step_dt)
+    steps, at_once = round(simulated / env.step_dt), round(stretch / env.step_dt)
     made, finding, hearing = 0, 0.0, 0.0
 
     def listen(_: object, dones: torch.Tensor) -> None:

@@ -31,7 +31,7 @@ from mute.acoustics.soundscape import SOURCES, Soundscape
 from mute.acoustics.tally import HeardLevels, Tally
 from mute.envs.quadruped_env import QuadrupedEnv
 
-__all__ = ["SAMPLE_RATE", "WAV_FULL_SCALE", "Listener"]
+__all__ = ["SAMPLE_RATE", "SILENT_STRETCH", "STRETCH", "WAV_FULL_SCALE", "Listener"]
 
 SAMPLE_RATE = 48000
 """Of all sound that is made here, Hz."""
@@ -39,6 +39,12 @@ SAMPLE_RATE = 48000
 WAV_FULL_SCALE = 10.0
 """Sound pressure of a full-scale sample in a WAV file, Pa. Always the same, so that a quiet walk
 sounds quiet beside a loud one; 10 Pa is a peak of 114 dB, as a boarded floor has under a foot."""
+
+STRETCH = 0.5
+"""Time that is worked on at once, s; it bounds the memory."""
+
+SILENT_STRETCH = 2.0
+"""The same where no sound is made, and less memory needed: each stretch costs some milliseconds."""
 
 
 class Listener:
@@ -61,7 +67,7 @@ class Listener:
         settle_time: float = 1.0,
         seed: int = 0,
         wav: Path | Mapping[int, Path] | None = None,
-        stretch: float = 0.5,
+        stretch: float | None = None,
         robots: slice | None = None,
         from_energies: bool = False,
         wav_start: float | None = None,
@@ -78,7 +84,8 @@ class Listener:
             settle_time: Time that the figures leave out, at the start and after each fall, s.
             seed: Of all noise.
             wav: File for the sound of the first robot, or files by robot; they begin on entering.
-            stretch: Time that is worked on at once, s.
+            stretch: Time that is worked on at once, s. Default: `STRETCH`, or where no sound is
+                made `SILENT_STRETCH`.
             robots: Which robots to hear, counted from the first of them; None for all.
             from_energies: Take the levels from `EnergyMeter`, without making sound that no file
                 wants. Files change no figure then.
@@ -111,6 +118,8 @@ class Listener:
             )
         self._settle_steps = round(settle_time / env.step_dt)
         self._read_steps = self._settle_steps + math.ceil(settling_time("fast") / env.step_dt)
+        if stretch is None:
+            stretch = SILENT_STRETCH if self._soundscape is None else STRETCH
         self._steps_at_once = max(1, round(stretch / env.step_dt))
         start = self._settle_steps * env.step_dt if wav_start is None else wav_start
         self._skipped = round(start * SAMPLE_RATE)

@@ -8,6 +8,8 @@ the others. Each robot is in a world, and at a microphone, of its own.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import Protocol
 
 import numpy as np
@@ -24,6 +26,7 @@ from mute.acoustics.sources.drive import DriveSound
 from mute.acoustics.sources.fan import Fan
 from mute.acoustics.sources.landings import LandingSound
 from mute.acoustics.sources.scuffing import Scuffing
+from mute.support.threads import core_share
 
 __all__ = ["SOURCES", "Soundscape", "StepClock", "check_sources"]
 
@@ -32,6 +35,10 @@ SOURCES = ("impacts", "body", "drive", "scuffing", "fan")
 
 _CHUNK = 0.1
 """Longest stretch that is rendered at a time, s: it bounds the memory, and fits caches."""
+
+_MANY = 4
+"""Robots from which on sources are rendered side by side, each in a thread: what they compute in
+does not hold up the others."""
 
 
 class _Source(Protocol):
@@ -165,7 +172,7 @@ class Soundscape:
             part = block.part(first, stop)
             where = self.microphone.position(part)
             edges = bounds[first : stop + 1]
-            heard = [source.render(part, where, edges) for source in self._sources]
+            heard = self._heard(part, where, edges)
             total = sum(heard)
             if self._room is not None:
                 near = sum(
@@ -175,3 +182,18 @@ class Soundscape:
                 total = total + self._room.render(np.asarray(near))
             out[:, edges[0] - bounds[0] : edges[-1] - bounds[0]] = total
         return out
+
+    def _heard(self, part: ContactBlock, where: NDArray, edges: NDArray) -> list[NDArray]:
+        """Return the sound of each source, which have nothing to do with one another."""
+
+        def render(source: _Source) -> NDArray:
+            return source.render(part, where, edges)
+
+        if self.num_robots < _MANY:
+            return [render(source) for source in self._sources]
+        return list(_threads().map(render, self._sources))
+
+
+@cache
+def _threads() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(core_share(), thread_name_prefix="sound")

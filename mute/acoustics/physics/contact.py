@@ -31,7 +31,7 @@ from scipy.optimize import root_scalar
 
 __all__ = ["Blow", "ContactLaw", "hertz_duration", "hertz_stiffness", "series_modulus"]
 
-_STEPS = 3072
+_STEPS = 1024
 """Steps of an integration, as many for each blow."""
 _LONGEST = (8.0, 10.0)
 """Time that is integrated, in units of D / v: so much, and so much more times y. A rigid ground
@@ -228,17 +228,29 @@ def _table(exponent: float, damping: float) -> _Table:
     return _summed_up(forces, course, step)
 
 
+def _over(pressed: NDArray, depth: NDArray) -> float:
+    """Return at which step, and how far on to the next, a blow is over: faint, or out again."""
+    peak = int(pressed.argmax())
+    ends = []
+    for left in (pressed / pressed[peak] - _FAINT, depth):
+        gone = np.flatnonzero(left[peak:] <= 0.0)
+        if len(gone):
+            last = peak + int(gone[0]) - 1
+            ends.append(last + float(left[last] / (left[last] - left[last + 1])))
+    return min(ends)
+
+
 def _summed_up(forces: NDArray, course: NDArray, step: NDArray) -> _Table:
     """Return what blows came to, from their forces and (speeds, depths) at each step."""
     duration, left = np.empty(len(step)), np.empty(len(step))
     passed = np.empty((len(step), _SHAPE_POINTS))
-    for blow, pressed in enumerate(forces.T):
-        peak = int(pressed.argmax())
-        faint = (pressed[peak:] < _FAINT * pressed[peak]) | (course[peak:, 1, blow] <= 0.0)
-        last = peak + int(faint.argmax())
-        times = np.arange(last + 1) * step[blow]
-        so_far = cumulative_trapezoid(pressed[: last + 1], dx=step[blow], initial=0.0)
-        duration[blow], left[blow] = times[-1], course[last, 0, blow]
+    for blow, (pressed, depth) in enumerate(zip(forces.T, course[:, 1].T, strict=True)):
+        over = _over(pressed, depth)
+        last = int(over)
+        times = np.append(np.arange(last + 1), over) * step[blow]
+        until = np.append(pressed[: last + 1], np.interp(over, np.arange(len(pressed)), pressed))
+        so_far = cumulative_trapezoid(until, times, initial=0.0)
+        duration[blow], left[blow] = times[-1], course[last + 1, 0, blow]
         points = np.linspace(0.0, times[-1], _SHAPE_POINTS)
         passed[blow] = np.interp(points, times, so_far / so_far[-1])
     return _Table(duration, 1.0 - left, 1.0 - left**2, passed)

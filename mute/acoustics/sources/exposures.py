@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.fft import rfft
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
@@ -169,11 +170,12 @@ def _forces(floor: Floor) -> NDArray[np.float64]:
     # Between its steps the force is constant, which blurs them; padded, the transform is fine
     # enough to be read between its points, once it is turned to be about the pulse's middle.
     count = _SHAPE_STEPS * _PADDING
-    spectrum = np.fft.fft(shape, count, axis=1)
-    spectrum *= np.exp(1j * np.pi * np.fft.fftfreq(count, 1.0 / count) / _PADDING)
-    position = np.mod(cycles * _PADDING, count)
-    index = position.astype(np.int64)
-    low, high = (np.take_along_axis(spectrum, (index + step) % count, axis=1) for step in (0, 1))
+    spectrum = rfft(shape, count, axis=1)
+    spectrum *= np.exp(1j * np.pi * np.arange(spectrum.shape[1]) / _PADDING)
+    # Beyond its steps' half frequency a spectrum comes again, mirrored.
+    position = np.abs(np.mod(cycles * _PADDING + 0.5 * count, count) - 0.5 * count)
+    index = np.minimum(position.astype(np.int64), count // 2 - 1)
+    low, high = (np.take_along_axis(spectrum, index + step, axis=1) for step in (0, 1))
     between = low + (position - index) * (high - low)
     size = np.abs(between) * np.sinc(cycles / _SHAPE_STEPS) * blow.impulse[:, None]
     return 2.0 * np.diff(edges) * np.square(size)

@@ -9,22 +9,28 @@ transform, when it begins, and added to what each robot's microphone is yet to h
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+
 import numpy as np
-from numpy.fft import irfft, rfft
 from numpy.typing import NDArray
 
 from mute.acoustics.air import SPEED_OF_SOUND
 from mute.acoustics.contacts import ContactBlock, Impacts
 from mute.acoustics.floors import Floor
 from mute.acoustics.microphone import distance
+from mute.acoustics.sources.halves import Half, LowPending, halves, low_divisor
 from mute.acoustics.sources.pending import Pending
-from mute.acoustics.sources.response import PLACES, PlateResponse, floor_response
+from mute.acoustics.sources.response import LONGEST_PULSE, PLACES, floor_response
 from mute.acoustics.sources.shell import SIDES, shell_response
 
 __all__ = ["LandingSound", "place_struck", "sampled_force"]
 
-_AT_ONCE = 32
+_AT_ONCE = 64
 """Blows that are worked out side by side, which bounds the memory."""
+
+_PULSES = (0.03, LONGEST_PULSE)
+"""Lengths of transforms for the forces of short and of long blows, s."""
 
 _PLACE_SIZE = 0.2
 """Length of the squares within which a floor sounds alike, m (chosen)."""
@@ -40,7 +46,7 @@ def place_struck(position: NDArray) -> NDArray[np.int64]:
 
 
 def sampled_force(
-    floor: Floor, mass: NDArray, speed: NDArray, lead: NDArray, sample_rate: int, samples: int
+    floor: Floor, mass: NDArray, speed: NDArray, lead: NDArray, sample_rate: float, samples: int
 ) -> NDArray[np.float64]:
     """Return the forces of blows as means over the sample intervals, N.
 
@@ -88,9 +94,12 @@ class LandingSound:
         self._floors = floors
         self._floor_heard, self._share = floor_heard, transmissibility
         heard = floors if floor_heard else ()
-        self._responses = [floor_response(floor.plate, sample_rate) for floor in heard]
-        self._shell = shell_response(sample_rate)
-        self._pending = Pending(num_robots)
+        self._halves = [
+            halves(floor_response(floor.plate, sample_rate), sample_rate) for floor in heard
+        ]
+        self._shell = halves(shell_response(sample_rate), sample_rate)
+        self._high = Pending(num_robots)
+        self._low = LowPending(num_robots, low_divisor(sample_rate))
 
     def render(self, block: ContactBlock, microphone: NDArray, bounds: NDArray) -> NDArray:
         """Return the block's pressure, Pa. Shape: (robots, samples).
@@ -101,48 +110,80 @@ class LandingSound:
             bounds: Sample at which each step begins, and the end of the last. Shape: (steps + 1,).
         """
         first, stop = int(bounds[0]), int(bounds[-1])
-        where = microphone[block.impact_steps(), block.impacts.robot]
-        for index in range(len(self._floors)):
+        self._low.begin(first)
+        step = block.impact_steps()
+        where = microphone[step, block.impacts.robot]
+        trunk = block.trunk_pos[step, block.impacts.robot]
+        for index, floor in enumerate(self._floors):
             here = (block.impacts.floor == index) & (block.impacts.speed > _FAINTEST)
-            struck = np.flatnonzero(here)
-            for begin in range(0, len(struck), _AT_ONCE):
-                some = struck[begin : begin + _AT_ONCE]
-                trunk = block.trunk_pos[block.impact_steps()[some], block.impacts.robot[some]]
-                self._strike(index, block.impacts.select(some), where[some], trunk, first)
-        return self._pending.take(stop - first)
+            for some, pulse in _batches(floor, block.impacts, np.flatnonzero(here)):
+                blows = block.impacts.select(some)
+                self._strike(index, blows, pulse, where[some], trunk[some], first)
+        return self._high.take(stop - first) + self._low.take(first, stop)
 
     def _strike(
-        self, floor: int, blows: Impacts, microphone: NDArray, trunk: NDArray, first: int
+        self,
+        floor: int,
+        blows: Impacts,
+        pulse: float,
+        microphone: NDArray,
+        trunk: NDArray,
+        first: int,
     ) -> None:
-        """Add what is heard of some blows on one floor."""
+        """Add what is heard of some blows on one floor, none of which takes longer than `pulse`."""
         own = self._floors[floor]
         if self._floor_heard:
-            response = self._responses[floor]
             apart = distance(blows.position, microphone)
-            place = place_struck(blows.position)
-            self._add(own, blows, apart, response.transfer(apart, place), response, first)
+            place, size = place_struck(blows.position), np.ones(len(blows))
+            for half in self._halves[floor]:
+                self._add(half, own, blows, pulse, first, apart, place, size)
         if self._share > 0.0:
             apart = distance(trunk, microphone)
-            side = self._share * SIDES[blows.foot]
-            transfer = side[:, None] * self._shell.transfer(apart, blows.foot)
-            self._add(own, blows, apart, transfer, self._shell, first)
+            size = self._share * SIDES[blows.foot]
+            for half in self._shell:
+                self._add(half, own, blows, pulse, first, apart, blows.foot, size)
 
     def _add(
         self,
+        half: Half,
         floor: Floor,
         blows: Impacts,
-        apart: NDArray,
-        transfer: NDArray,
-        response: PlateResponse,
+        pulse: float,
         first: int,
+        apart: NDArray,
+        place: NDArray,
+        size: NDArray,
     ) -> None:
-        """Add what one filter makes of blows to what is yet to be heard."""
-        rate = self._sample_rate
-        arrival = blows.time + apart / SPEED_OF_SOUND
-        begin = np.floor(arrival * rate).astype(np.int64) + 1
-        force = sampled_force(
-            floor, blows.mass, blows.speed, begin / rate - arrival, rate, response.longest_pulse
-        )
-        heard = irfft(rfft(force, response.length, axis=1) * transfer, response.length, axis=1)
-        for robot, offset, sound in zip(blows.robot, begin - first, heard, strict=True):
-            self._pending.add(robot, max(0, int(offset)), sound)
+        """Add what half of a filter makes of blows to what is yet to be heard."""
+        # What is given ahead of its time must not come before the blow: from nearer than `late` it
+        # is late indeed.
+        arrival = blows.time + np.maximum(apart / SPEED_OF_SOUND - half.late, 0.0)
+        begin = np.floor(arrival * half.rate).astype(np.int64) + 1
+        samples = math.ceil(pulse * half.rate) + 1
+        lead = begin / half.rate - arrival
+        force = sampled_force(floor, blows.mass, blows.speed, lead, half.rate, samples)
+        heard = half.heard(force, apart, place, size)
+        if half.low:
+            for robot, start, sound in zip(blows.robot, begin, heard, strict=True):
+                self._low.add(robot, int(start), sound)
+        else:
+            for robot, offset, sound in zip(blows.robot, begin - first, heard, strict=True):
+                self._high.add(robot, max(0, int(offset)), sound)
+
+
+def _batches(
+    floor: Floor, impacts: Impacts, struck: NDArray[np.int64]
+) -> Iterator[tuple[NDArray[np.int64], float]]:
+    """Yield blows on a floor to be worked out side by side, and how long the longest may take.
+
+    Args:
+        floor: What is struck.
+        impacts: All blows.
+        struck: Indices of those on the floor.
+    """
+    lasting = floor.contact.blow(impacts.mass[struck], impacts.speed[struck]).duration
+    kind = np.searchsorted(_PULSES[:-1], lasting)
+    for index, pulse in enumerate(_PULSES):
+        alike = struck[kind == index]
+        for begin in range(0, len(alike), _AT_ONCE):
+            yield alike[begin : begin + _AT_ONCE], pulse

@@ -15,7 +15,7 @@ class Pending:
         """Start in silence."""
         self._samples = np.zeros((num_robots, 0))
 
-    def add(self, robots: NDArray | slice, offset: int, sound: NDArray) -> None:
+    def add(self, robots: NDArray | slice | int, offset: int, sound: NDArray) -> None:
         """Add sound.
 
         Args:
@@ -26,6 +26,20 @@ class Pending:
         stop = offset + sound.shape[-1]
         self._reach(stop)
         self._samples[robots, offset:stop] += sound
+
+    def add_all(self, robots: NDArray, offsets: NDArray, sounds: NDArray) -> None:
+        """Add short sounds, of which one robot may have several.
+
+        Args:
+            robots: Whose each is. Shape: (n,).
+            offsets: Samples from the next one on, after which each begins. Shape: (n,).
+            sounds: Shape: (n, samples).
+        """
+        if not len(robots):
+            return
+        self._reach(int(offsets.max()) + sounds.shape[1])
+        at = offsets[:, None] + np.arange(sounds.shape[1])
+        np.add.at(self._samples, (robots[:, None], at), sounds)
 
     def take(self, samples: int) -> NDArray[np.float64]:
         """Return the next samples, and forget them. Shape: (robots, samples)."""

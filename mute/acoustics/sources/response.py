@@ -13,14 +13,25 @@ from scipy.fft import next_fast_len
 from mute.acoustics.physics.plate import Plate
 from mute.acoustics.physics.ringing import OCTAVES, ringing_responses
 
-__all__ = ["PLACES", "PlateResponse", "floor_response"]
+__all__ = ["LONGEST_PULSE", "PLACES", "PlateResponse", "audible_end", "floor_response"]
 
 PLACES = 12
 """Places of a plate that sound different when they are struck."""
 
-_LONGEST_PULSE = 0.15
+LONGEST_PULSE = 0.15
 """Longest force that the filter takes in, s: on carpet 4 kg press for 0.12 s at 5 cm/s. What is
 slower still, and is not heard, is cut."""
+
+
+def audible_end(impulses: NDArray, gone: float = 1e-8) -> int:
+    """Return after how many samples responses are over.
+
+    Args:
+        impulses: Shape: (n, samples).
+        gone: Share of each one's energy that may be cut off its end.
+    """
+    left = np.square(impulses)[:, ::-1].cumsum(axis=1)[:, ::-1]
+    return int((left > gone * left[:, :1]).any(axis=0).sum())
 
 
 def _above(corner: float, frequency: NDArray) -> NDArray[np.complex128]:
@@ -49,7 +60,7 @@ class PlateResponse:
         ringing = ringing_responses(
             plate, sample_rate, PLACES, seed, even=form == "body", panels=panels
         )
-        longest_pulse = round(_LONGEST_PULSE * sample_rate)
+        longest_pulse = round(LONGEST_PULSE * sample_rate)
         length = next_fast_len(ringing.shape[2] + longest_pulse, real=True)
         assert length is not None
         self.length = length
@@ -60,14 +71,28 @@ class PlateResponse:
         self.frequency = rfftfreq(self.length, 1.0 / sample_rate)
         """Of the filter, Hz. Shape: (frequencies,)."""
         self.frequency[0] = self.frequency[1]  # nothing is heard of it, and formulas divide by it
-        small = _above(plate.first_mode, self.frequency) if form == "body" else 1.0
-        self.direct = small * plate.direct_pressure(self.frequency)
+        self.direct = self.direct_at(self.frequency)
         """What a floor radiates at once, at 1 m, Pa / N. Shape: (frequencies,)."""
-        spectra = small * rfft(ringing / sample_rate, self.length, axis=2)
+        spectra = self._small(self.frequency) * rfft(ringing / sample_rate, self.length, axis=2)
         self.ringing = spectra.astype(np.complex64)
         """What rings, times the root of the area that it goes through, Pa m / N.
 
         Shape: (places, octaves, frequencies)."""
+
+    def _small(self, frequency: NDArray) -> NDArray[np.complex128]:
+        """Return what the size of a body leaves. Shape: (frequencies,)."""
+        if self._form == "body":
+            return _above(self._plate.first_mode, frequency)
+        return np.ones(len(frequency), dtype=np.complex128)
+
+    def direct_at(self, frequency: NDArray) -> NDArray[np.complex128]:
+        """Return what a floor radiates at once, at 1 m, Pa / N. Shape: (frequencies,).
+
+        Args:
+            frequency: Hz, even from 0 on; of 0 nothing is heard, and formulas divide by it.
+        """
+        above = np.maximum(frequency, frequency[1])
+        return self._small(above) * self._plate.direct_pressure(above)
 
     def impulse(self, place: int) -> NDArray[np.float64]:
         """Return what is heard of a force of one sample at 1 m from a body, Pa / N."""
@@ -90,15 +115,25 @@ class PlateResponse:
         Returns:
             Of the frequencies of a real transform of `length` samples. Shape: (n, frequencies).
         """
+        size = np.sqrt(self.spread(distance)).astype(np.float32)
+        ringing = np.einsum("no,nof->nf", size, self.ringing[place])
+        return self.direct / distance[:, None] + ringing
+
+    def spread(self, distance: NDArray) -> NDArray[np.float64]:
+        """Return p^2 over what rings at a distance, 1 / m^2, as `Plate.spread`.
+
+        A factor an octave: one that went with the frequency would ring before the blow.
+
+        Args:
+            distance: Of the blow from the microphone, m. Shape: (n,).
+
+        Returns:
+            Factors. Shape: (n, octaves).
+        """
         apart = distance[:, None]
         if self._form == "body":
-            spread = np.broadcast_to(1.0 / (2.0 * np.pi * apart**2), (len(apart), len(OCTAVES)))
-        else:
-            spread = self._plate.spread(OCTAVES, apart)
-        # A factor an octave: one that went with the frequency would ring before the blow.
-        size = np.sqrt(spread).astype(np.float32)
-        ringing = np.einsum("no,nof->nf", size, self.ringing[place])
-        return self.direct / apart + ringing
+            return np.broadcast_to(1.0 / (2.0 * np.pi * apart**2), (len(apart), len(OCTAVES)))
+        return self._plate.spread(OCTAVES, apart)
 
 
 @cache

@@ -125,8 +125,8 @@ def test_a_pulse_that_reaches_over_the_end_of_a_block_goes_on_in_the_next():
     block = make_block(100, landings=[(49, 0, 0, 0.4, 1.5)])
     sound = Soundscape(1, FLOORS, sources=("impacts",))
     first, second = sound.render(block.part(0, 50)), sound.render(block.part(50, 100))
-    assert not first.any()  # it is still on its way
-    assert second.any()
+    # It is still on its way; a filter between samples begins with next to nothing.
+    assert np.abs(first).max() < 1e-3 * np.abs(second).max()
 
 
 def test_blocks_of_samples_tile_time_at_odd_rates():

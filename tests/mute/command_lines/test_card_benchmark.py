@@ -17,6 +17,7 @@ _SOUND = {
     "floor": "wood",
     "machine": "a machine for sound",
     "parts": [{"name": "whole", "robots": 1, "wall": 1.0, "real_time": 1.0}],
+    "table": 0.25,
     "memory_mb": 1.0,
     "memory_growth_mb": 0.0,
 }

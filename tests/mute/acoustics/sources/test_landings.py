@@ -123,16 +123,19 @@ def test_sound_of_a_floor_comes_r_over_c_late_and_weaker_by_r():
     np.testing.assert_allclose(
         second[100:] * far, first[:-100] * near, atol=1e-6 * np.abs(first).max()
     )
-    assert not second[: round(far / 343.0 * RATE)].any()
-    assert second[: round(far / 343.0 * RATE) + 48].any()
+    # A filter between samples begins a moment before, with next to nothing.
+    early = second[: round(far / 343.0 * RATE)]
+    assert np.abs(early).max() < 1e-4 * np.abs(second).max()
+    assert np.abs(second[: len(early) + 48]).max() > 1e-2 * np.abs(second).max()
 
 
 def test_sound_of_the_shell_comes_r_over_c_late_and_weaker_by_r():
     near = 0.5
     far = near + 100.0 * 343.0 / RATE
     first, second = (_landing(microphone=_ahead_of_the_trunk(r), share=0.1) for r in (near, far))
+    # Half of it is worked out at other instants of the blow: 100 samples are 12.5 of its own.
     np.testing.assert_allclose(
-        second[100:] * far, first[:-100] * near, atol=1e-5 * np.abs(first).max()
+        second[100:] * far, first[:-100] * near, atol=2e-3 * np.abs(first).max()
     )
 
 

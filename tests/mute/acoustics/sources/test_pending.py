@@ -59,3 +59,19 @@ def test_to_take_nothing_leaves_all():
     pending.add(FIRST, 0, np.ones(4))
     assert pending.take(0).shape == (1, 0)
     np.testing.assert_allclose(pending.take(4)[0], np.ones(4))
+
+
+def test_many_sounds_add_up_also_where_they_overlap():
+    robots, offsets = np.array([0, 1, 0]), np.array([2, 0, 3])
+    sounds = np.arange(12.0).reshape(3, 4)
+    pending, expected = Pending(2), Pending(2)
+    pending.add_all(robots, offsets, sounds)
+    for robot, offset, sound in zip(robots, offsets, sounds, strict=True):
+        expected.add(robot, offset, sound)
+    np.testing.assert_allclose(pending.take(9), expected.take(9))
+
+
+def test_no_sounds_are_silence():
+    pending = Pending(1)
+    pending.add_all(np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros((0, 4)))
+    assert not pending.take(5).any()
