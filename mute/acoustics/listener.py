@@ -44,7 +44,9 @@ STRETCH = 0.5
 """Time that is worked on at once, s; it bounds the memory."""
 
 SILENT_STRETCH = 2.0
-"""The same where no sound is made, and less memory needed: each stretch costs some milliseconds."""
+"""The same where no sound is made of few robots: each stretch costs some milliseconds."""
+_FEW = 16
+"""Robots up to which that is worth its memory."""
 
 
 class Listener:
@@ -85,7 +87,7 @@ class Listener:
             seed: Of all noise.
             wav: File for the sound of the first robot, or files by robot; they begin on entering.
             stretch: Time that is worked on at once, s. Default: `STRETCH`, or where no sound is
-                made `SILENT_STRETCH`.
+                made, of few robots, `SILENT_STRETCH`.
             robots: Which robots to hear, counted from the first of them; None for all.
             from_energies: Take the levels from `EnergyMeter`, without making sound that no file
                 wants. Files change no figure then.
@@ -119,7 +121,8 @@ class Listener:
         self._settle_steps = round(settle_time / env.step_dt)
         self._read_steps = self._settle_steps + math.ceil(settling_time("fast") / env.step_dt)
         if stretch is None:
-            stretch = SILENT_STRETCH if self._soundscape is None else STRETCH
+            silent = self._soundscape is None and self._count <= _FEW
+            stretch = SILENT_STRETCH if silent else STRETCH
         self._steps_at_once = max(1, round(stretch / env.step_dt))
         start = self._settle_steps * env.step_dt if wav_start is None else wav_start
         self._skipped = round(start * SAMPLE_RATE)

@@ -7,6 +7,7 @@ the others. Each robot is in a world, and at a microphone, of its own.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -197,3 +198,7 @@ class Soundscape:
 @cache
 def _threads() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(core_share(), thread_name_prefix="sound")
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows
+    os.register_at_fork(after_in_child=_threads.cache_clear)  # a copied process has no threads

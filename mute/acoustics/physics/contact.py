@@ -31,8 +31,9 @@ from scipy.optimize import root_scalar
 
 __all__ = ["Blow", "ContactLaw", "hertz_duration", "hertz_stiffness", "series_modulus"]
 
-_STEPS = 1024
-"""Steps of an integration, as many for each blow."""
+_STEPS = 3072
+"""Steps of an integration, as many for each blow. Between them the force is constant: with a third
+of them what a soft blow has left at high frequencies is 4 dB too much."""
 _LONGEST = (8.0, 10.0)
 """Time that is integrated, in units of D / v: so much, and so much more times y. A rigid ground
 holds a blow for 3 (e = 1) or less; one that gives way, for some times y."""

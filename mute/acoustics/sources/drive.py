@@ -319,7 +319,8 @@ class DriveExposure:
         The table is even, and is read without a search.
         """
         step = self._frequency[1]
-        place = np.minimum(frequency / step, len(self._heard) - 1.0)
+        # No number, as of somebody else's robot, is beyond the table.
+        place = np.fmin(frequency / step, len(self._heard) - 1.0)
         index = np.minimum(place.astype(np.int64), len(self._heard) - 2)
         low = self._heard[index]
         return low + (place - index) * (self._heard[index + 1] - low)

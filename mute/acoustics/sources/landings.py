@@ -98,6 +98,7 @@ class LandingSound:
             halves(floor_response(floor.plate, sample_rate), sample_rate) for floor in heard
         ]
         self._shell = halves(shell_response(sample_rate), sample_rate)
+        self._latest = max(half.late for half in self._shell)
         self._high = Pending(num_robots)
         self._low = LowPending(num_robots, low_divisor(sample_rate))
 
@@ -130,7 +131,7 @@ class LandingSound:
         trunk: NDArray,
         first: int,
     ) -> None:
-        """Add what is heard of some blows on one floor, none of which takes longer than `pulse`."""
+        """Add what is heard of some blows on one floor, of each no more than `pulse` seconds."""
         own = self._floors[floor]
         if self._floor_heard:
             apart = distance(blows.position, microphone)
@@ -155,9 +156,9 @@ class LandingSound:
         size: NDArray,
     ) -> None:
         """Add what half of a filter makes of blows to what is yet to be heard."""
-        # What is given ahead of its time must not come before the blow: from nearer than `late` it
-        # is late indeed.
-        arrival = blows.time + np.maximum(apart / SPEED_OF_SOUND - half.late, 0.0)
+        # The lower half is given ahead of its time, but not before the blow: what is nearer than
+        # its lateness is heard as from there, both halves alike.
+        arrival = blows.time + np.maximum(apart / SPEED_OF_SOUND, self._latest) - half.late
         begin = np.floor(arrival * half.rate).astype(np.int64) + 1
         samples = math.ceil(pulse * half.rate) + 1
         lead = begin / half.rate - arrival

@@ -1,11 +1,15 @@
 """All sources together, streamed."""
 
 import dataclasses
+import os
+import select
+import signal
 
 import numpy as np
 import pytest
 from sound_helpers import make_block, random_walk
 
+from mute.acoustics import soundscape
 from mute.acoustics.body import load_transmissibility
 from mute.acoustics.soundscape import SOURCES, Soundscape, check_sources
 
@@ -41,6 +45,33 @@ def test_streamed_equals_whole(length, sample_rate, seconds):
     parts = _in_parts(block, length, sample_rate)
     assert parts.shape == whole.shape == (2, round(seconds * sample_rate))
     _assert_close(parts, whole)
+
+
+def test_sources_side_by_side_sound_as_one_after_the_other(monkeypatch):
+    block = _on_two_floors(seconds=0.4, robots=5, seed=6)
+    beside = Soundscape(5, FLOORS).render(block)
+    monkeypatch.setattr(soundscape, "_MANY", 1000)
+    np.testing.assert_array_equal(Soundscape(5, FLOORS).render(block), beside)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not copied here")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_process_that_is_copied_still_hears():
+    block = _on_two_floors(seconds=0.1, robots=4, seed=7)
+    expected = Soundscape(4, FLOORS).render(block)
+    pipe, into = os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            os.write(into, Soundscape(4, FLOORS).render(block).tobytes()[-64:])
+        finally:
+            os._exit(0)
+    ready, _, _ = select.select([pipe], [], [], 60.0)
+    if not ready:
+        os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    assert ready, "the copy of the process hangs"
+    assert os.read(pipe, 64) == expected.tobytes()[-64:]
 
 
 @pytest.mark.parametrize("source", SOURCES)

@@ -254,6 +254,12 @@ def test_the_exposure_of_tones_is_that_of_their_sound(speed):
     assert 10.0 * math.log10(counted / P_REF**2) == pytest.approx(heard, abs=0.2)
 
 
+def test_a_joint_of_no_speed_at_all_is_no_error():
+    # A simulation of somebody else's may blow up.
+    for speed in (math.nan, math.inf, 1e6):
+        DriveExposure(1, RATE, SHARE).squares(_torques(np.full(20, 7.0), 2, joint_vel=speed))
+
+
 @pytest.mark.parametrize("joint", [0, 2])
 def test_the_exposure_of_teeth_that_meet_is_that_of_their_sound(joint):
     block = _jump(5.0, joint, steps=1000)

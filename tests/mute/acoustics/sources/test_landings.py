@@ -11,8 +11,9 @@ from sound_helpers import FEET, RATE, a_weighted_level, level, make_block
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.metering.weighting import AWeighting
 from mute.acoustics.microphone import Microphone
+from mute.acoustics.physics import contact
 from mute.acoustics.sources.landings import LandingSound, place_struck, sampled_force
-from mute.acoustics.sources.response import PLACES
+from mute.acoustics.sources.response import PLACES, floor_response
 from mute.acoustics.sources.shell import SIDES
 
 WOOD, TILE = FLOORS["wood"], FLOORS["tile"]
@@ -90,6 +91,21 @@ def test_a_force_has_the_spectrum_of_its_contact():
     np.testing.assert_allclose(heard, expected, atol=1e-3 * expected[0])
 
 
+def test_a_force_has_no_steps_that_are_heard(monkeypatch):
+    # What a soft blow on a carpet has at high frequencies is little: coarse steps would be more.
+    def heard():
+        force = [_force(0.0, mass, 0.15, floor=FLOORS["carpet"]) for mass in (0.5, 1.0, 2.0)]
+        return [a_weighted_level(np.diff(each)) for each in force]
+
+    usual = heard()
+    monkeypatch.setattr(contact, "_STEPS", 2 * contact._STEPS)
+    contact._table.cache_clear()
+    try:
+        np.testing.assert_allclose(usual, heard(), atol=0.3)
+    finally:
+        contact._table.cache_clear()
+
+
 def test_a_harder_blow_is_shorter_as_hertz_says():
     lasting = [np.count_nonzero(_force(0.0, speed=v, floor=FLOORS["concrete"])) for v in (0.2, 0.8)]
     assert lasting[1] / lasting[0] == pytest.approx(4.0**-0.2, rel=0.01)
@@ -137,6 +153,19 @@ def test_sound_of_the_shell_comes_r_over_c_late_and_weaker_by_r():
     np.testing.assert_allclose(
         second[100:] * far, first[:-100] * near, atol=2e-3 * np.abs(first).max()
     )
+
+
+@pytest.mark.parametrize("apart", [0.06, 0.19])
+def test_from_near_a_blow_is_as_loud_as_by_the_whole_filter(apart):
+    # Nearer than the way that the lower half is late by, and still both halves come together.
+    floor = FLOORS["concrete"]
+    sound = _landing(floor=floor, microphone=_above_front_right(apart))
+    response = floor_response(floor.plate, RATE)
+    foot = FEET[:1] - (0.0, 0.0, FEET[0, 2])
+    transfer = response.transfer(np.array([apart]), place_struck(foot))[0]
+    force = np.fft.rfft(_force(0.0, floor=floor), response.length)
+    whole = np.fft.irfft(force * transfer, response.length)[: len(sound)]
+    assert a_weighted_level(sound) == pytest.approx(a_weighted_level(whole), abs=0.05)
 
 
 def test_ten_times_the_share_of_the_force_is_20_db_more_of_the_shell():
