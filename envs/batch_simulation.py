@@ -13,6 +13,7 @@ from mujoco.batch import Batch, SimulationError
 
 from .engine_version import check_version, version_entry
 from .model_fields import load_fields, saved_fields
+from .scene import GROUND_BOX
 from .simulation import MAX_SPEED, Stage
 
 __all__ = ["BatchSimulation", "as_stepped"]
@@ -74,6 +75,8 @@ class BatchSimulation:
         self._recorded: tuple[str, ...] = ()
         self._records: dict[str, np.ndarray] = {}
         self._failed = np.zeros(num_envs, dtype=bool)
+        self._past = self._batch.bind("history") if self.model.nhistory else None
+        self._past_ctrl = _past_ctrl(self.model)
 
     def record(self, *names: str) -> None:
         """Keep in `substeps`, from the next `step` on, what arrays hold in its physics steps."""
@@ -102,6 +105,9 @@ class BatchSimulation:
         ids = _ids(mask)
         with self._calling():
             self._batch.reset(ids, keyframe, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
+            if self._past is not None:  # else delayed motors would first be asked for 0
+                ctrl = np.repeat(self.model.key_ctrl[keyframe], self._past_ctrl.shape[1])
+                self._past[np.ix_(np.arange(self.num_envs)[ids], self._past_ctrl.ravel())] = ctrl
         self._failed[ids] = False
 
     def unstable(self) -> torch.Tensor:
@@ -210,18 +216,31 @@ def as_stepped(model: mujoco.MjModel, trees: bool | None = None) -> mujoco.MjMod
 
     Args:
         model: The compiled model.
-        trees: Whether to have them; None where a body has many shapes.
+        trees: Whether to have them; None where a body has many shapes, unless these are laid anew
+            all the time, of which a tree knows nothing.
 
     Returns:
         The model itself, or a copy that differs in that.
     """
     if trees is None:
-        trees = bool(model.body_geomnum.max() > _MANY_SHAPES)
+        moved = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, GROUND_BOX.format(0)) >= 0
+        trees = not moved and bool(model.body_geomnum.max() > _MANY_SHAPES)
     if trees:
         return model
     model = copy.copy(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
     return model
+
+
+def _past_ctrl(model: mujoco.MjModel) -> np.ndarray:
+    """Return where a simulation's history holds the past set points of each motor.
+
+    Of each motor that is delayed it has a time, where it writes next, the times of its samples,
+    and these. Shape: (motors, samples).
+    """
+    samples = int(model.actuator_history[0, 0]) if model.nhistory else 0
+    first = model.actuator_historyadr.reshape(-1, 1) + 2 + samples
+    return first + np.arange(samples)
 
 
 def _ids(mask: torch.Tensor | None) -> np.ndarray | None:

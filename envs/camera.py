@@ -26,7 +26,7 @@ class Camera:
         picture = self._picture or Picture(env)
         renderer = self._renderer or mujoco.Renderer(picture.model, *self._size)
         self._picture, self._renderer = picture, renderer
-        picture.show(env.simulation.qpos[index])
+        picture.show(index)
         camera = mujoco.MjvCamera()
         camera.lookat[:] = picture.data.qpos[:3]
         camera.distance, camera.azimuth, camera.elevation = 1.5, 130.0, -15.0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import torch
 
 from .quadruped_env_cfg import QuadrupedEnvCfg
@@ -19,6 +17,7 @@ def place(
     simulation: Simulation,
     mask: torch.Tensor,
     draw: torch.Tensor,
+    heading: torch.Tensor,
     stand: torch.Tensor,
     cfg: QuadrupedEnvCfg,
 ) -> None:
@@ -28,6 +27,7 @@ def place(
         simulation: The engine, with those robots in its keyframe of the stance.
         mask: Robots that begin anew. Shape: (num_envs,), bool.
         draw: Random numbers in [-1, 1). Shape: (num_envs, NUM_DRAWS).
+        heading: Direction of each robot, where directions are random, rad. Shape: (num_envs,).
         stand: Joint positions of the stance, rad. Shape: (12,).
         cfg: The task.
     """
@@ -37,8 +37,8 @@ def place(
     qpos[:, 7:] = torch.where(column, joint_pos, qpos[:, 7:])
     qvel[:, :6] = torch.where(column, cfg.initial_velocity * draw[:, 12:18], qvel[:, :6])
     if cfg.random_heading:
-        half = 0.5 * math.pi * draw[:, 18]
+        half = 0.5 * heading
         zero = torch.zeros_like(half)
-        heading = torch.stack((half.cos(), zero, zero, half.sin()), dim=1)
-        qpos[:, 3:7] = torch.where(column, heading, qpos[:, 3:7])
+        turned = torch.stack((half.cos(), zero, zero, half.sin()), dim=1)
+        qpos[:, 3:7] = torch.where(column, turned, qpos[:, 3:7])
     simulation.ctrl[:] = torch.where(column, stand, simulation.ctrl)

@@ -6,6 +6,7 @@ observations. What a reward or an observation is stands in its own module; learn
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from typing import Any
@@ -31,10 +32,12 @@ from .observations import (
 from .quadruped_env_cfg import QuadrupedEnvCfg
 from .randomization import randomize_physics
 from .rewards import Motion, RewardSum
-from .scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS, build_scene
+from .scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS, SceneCfg, build_scene
 from .sensors import RobotSensors
-from .step_log import curriculum_log, episode_log, gait_log
-from .terrain import FlatTerrain, Terrain
+from .step_log import curriculum_log, episode_log, gait_log, ground_log
+from .terrain import BoxGround, FlatGround, Ground, kind_of_robot, num_boxes
+from .terrain.draws import KEYS
+from .terrain.levels import Travelled, next_levels
 
 __all__ = ["NUM_ACTIONS", "QuadrupedEnv"]
 
@@ -79,19 +82,23 @@ class QuadrupedEnv(VecEnv):
         then tell. Whoever listens appends itself, and removes itself in the end."""
         self.step_dt = cfg.step_dt
         self.max_episode_length = math.ceil(cfg.episode_length / cfg.step_dt)
-        self.model = build_scene(cfg.scene, pictured=False)
+        self.model = build_scene(scene_of(cfg), pictured=False)
         self._stand_key = self.model.key("stand").id
         self.simulation = make_simulation(
             self.model, cfg.num_envs, device, cfg.num_threads, cfg.engine
         )
         self.device = self.simulation.device
         self.generator = torch.Generator(self.device).manual_seed(cfg.seed)
-        self.physics = randomize_physics(self.simulation, cfg.randomization, self.generator)
+        drawn = randomize_physics(self.simulation, cfg.randomization, self.generator)
+        self.physics = drawn.known
         """Randomised physics as the critic sees it. Shape: (num_envs, PHYSICS_DIM)."""
+        self.encoder_offset, self.imu = drawn.encoder_offset, drawn.imu
         self._sensors = RobotSensors(self.simulation)
         self.grid = cfg.height_map.grid(self.device)
         """Points of the height map in the heading frame, m. Shape: (num_heights, 2)."""
-        self.terrain: Terrain = FlatTerrain()
+        self.ground = self._make_ground()
+        """The ground under the robots."""
+        self.travelled = Travelled(cfg.num_envs, self.device)
         self.commands = CommandSampler(cfg.commands, cfg.num_envs, self.generator, self.device)
         self.footfalls = Footfalls(
             cfg.footfall, cfg.num_envs, cfg.scene.timestep, cfg.decimation, self.device
@@ -132,6 +139,7 @@ class QuadrupedEnv(VecEnv):
         self.step_count += 1
         self.episode_length_buf += 1
         self._read_state()
+        self.travelled.update(self.commands.command, self.base_lin_vel, self.step_dt)
         self.fallen = self._falls()
         factors = self.curriculum
         motion = self._motion(phase)
@@ -150,6 +158,11 @@ class QuadrupedEnv(VecEnv):
         return self._observations, reward, dones, {"time_outs": time_outs, "log": log}
 
     # -- what others may set or read -------------------------------------------------------------
+
+    @property
+    def foot_pos(self) -> torch.Tensor:
+        """Centre of each foot in the world, m. Shape: (num_envs, 4, 3)."""
+        return self._sensors.foot_pos
 
     @property
     def curriculum(self) -> Curriculum:
@@ -193,6 +206,11 @@ class QuadrupedEnv(VecEnv):
         state["simulation"] = self.simulation.state_dict()
         state["footfalls"] = self.footfalls.state_dict()
         state["followed"] = self.followed.state_dict()
+        state["travelled"] = self.travelled.state_dict()
+        if isinstance(self.ground, BoxGround):
+            state["ground"] = {"level": self.ground.level.clone(), "key": self.ground.key.clone()}
+        state["encoder_offset"] = self.encoder_offset.clone()
+        state["imu"] = None if self.imu is None else self.imu.clone()
         state["observations"] = {key: value.clone() for key, value in self._observations.items()}
         return state
 
@@ -211,6 +229,15 @@ class QuadrupedEnv(VecEnv):
         self.generator.set_state(state["generator"])
         self.footfalls.load_state_dict(state["footfalls"])
         self.followed.load_state_dict(state["followed"])
+        if "travelled" in state:  # earlier versions have none of these
+            self.travelled.load_state_dict(state["travelled"])
+            self.encoder_offset = state["encoder_offset"].to(self.device, copy=True)
+            imu = state["imu"]
+            self.imu = None if imu is None else imu.to(self.device, copy=True)
+        if isinstance(self.ground, BoxGround):
+            self.ground.level = state["ground"]["level"].to(self.device, copy=True)
+            self.ground.key = state["ground"]["key"].to(self.device, copy=True)
+            self.ground.lay(self.simulation.qpos[:, :2], self._everyone())
         self._read_state()
         groups = {k: value.to(self.device, copy=True) for k, value in state["observations"].items()}
         self._observations = TensorDict(groups, batch_size=[self.num_envs])
@@ -234,6 +261,10 @@ class QuadrupedEnv(VecEnv):
         """Run the physics of one control step and record the feet at every physics step."""
         simulation = self.simulation
         torch.add(self.stand, self.action, alpha=self.cfg.action_scale, out=simulation.ctrl)
+        # Motors hold what their encoders read, which is the joint's position and the offset.
+        simulation.ctrl -= self.encoder_offset
+        if isinstance(self.ground, BoxGround):
+            self.ground.lay(simulation.qpos[:, :2])
         simulation.step(self.cfg.decimation)
         for listener in self.physics_listeners:
             listener()
@@ -257,7 +288,11 @@ class QuadrupedEnv(VecEnv):
 
     def _motion(self, phase: torch.Tensor) -> Motion:
         feet = self.footfalls
-        clearance = self._clearance()
+        # Feet and trunk in one call: looking up five heights takes hardly longer than one.
+        foot_pos = self._sensors.foot_pos
+        points = torch.cat((foot_pos[:, :, :2], self.base_pos[:, None, :2]), dim=1)
+        heights = self.ground.height(points)
+        clearance = foot_pos[:, :, 2] - FOOT_RADIUS - heights[:, : len(LEGS)]
         feet.update(clearance)
         joint_acc = (self.joint_vel - self.last_joint_vel) / self.step_dt
         self.last_joint_vel = self.joint_vel.clone()
@@ -271,7 +306,7 @@ class QuadrupedEnv(VecEnv):
                 self.commands.command, self.base_lin_vel, self.base_ang_vel
             ),
             projected_gravity=self.projected_gravity,
-            base_height=self.base_pos[:, 2] - self.terrain.height(self.base_pos[:, :2]),
+            base_height=self.base_pos[:, 2] - heights[:, len(LEGS)],
             joint_pos=self.joint_pos,
             joint_vel=self.joint_vel,
             joint_acc=joint_acc,
@@ -296,7 +331,7 @@ class QuadrupedEnv(VecEnv):
     def _clearance(self) -> torch.Tensor:
         """Return the air between each foot and the ground, m. Shape: (num_envs, 4)."""
         foot_pos = self._sensors.foot_pos
-        return foot_pos[:, :, 2] - FOOT_RADIUS - self.terrain.height(foot_pos[:, :, :2])
+        return foot_pos[:, :, 2] - FOOT_RADIUS - self.ground.height(foot_pos[:, :, :2])
 
     def _falls(self) -> torch.Tensor:
         """Return which robots fell; those of unstable simulations stand again already."""
@@ -307,11 +342,15 @@ class QuadrupedEnv(VecEnv):
     def _reset(self, mask: torch.Tensor) -> None:
         """Begin new episodes for the masked robots; no other robot is touched."""
         self.simulation.reset(mask, keyframe=self._stand_key)
-        place(self.simulation, mask, self._draw(self.num_envs, NUM_DRAWS), self.stand, self.cfg)
+        draw = self._draw(self.num_envs, NUM_DRAWS)
+        heading = self.ground.heading(draw[:, NUM_DRAWS - 1])
+        place(self.simulation, mask, draw, heading, self.stand, self.cfg)
+        self._renew_ground(mask)
         self._lift_to_ground(mask)
         self.commands.resample(mask, True, self.curriculum.commands)
         self.footfalls.reset(mask, self._sensors.foot_contact)
         self.followed.reset(mask)
+        self.travelled.reset(mask)
         for name in _PAST:
             setattr(self, name, getattr(self, name).masked_fill(mask.unsqueeze(1), 0.0))
         self.episode_length_buf = self.episode_length_buf.masked_fill(mask, 0)
@@ -323,6 +362,19 @@ class QuadrupedEnv(VecEnv):
         lowest = self._clearance().amin(dim=1)
         self.simulation.qpos[:, 2] -= torch.where(mask, lowest, 0.0)
         self.simulation.forward(mask)
+
+    def _renew_ground(self, mask: torch.Tensor) -> None:
+        """Lay other ground for the masked robots, of a level that follows what they could do."""
+        ground, cfg = self.ground, self.cfg.terrain
+        if not isinstance(ground, BoxGround):
+            return
+        unit = torch.rand(2, self.num_envs, generator=self.generator, device=self.device)
+        if cfg.curriculum and self.step_count:
+            made, asked = self.travelled.made, self.travelled.asked
+            levels = next_levels(ground.level, made, asked, self.fallen, cfg.crossed, unit[0])
+            ground.level = torch.where(mask, levels, ground.level)
+        ground.key = torch.where(mask, (unit[1] * KEYS).long(), ground.key)
+        ground.lay(self.simulation.qpos[:, :2], mask)
 
     def _resample_and_push(self, dones: torch.Tensor) -> None:
         due = self._due(self.cfg.commands.resampling_time) & ~dones
@@ -343,18 +395,22 @@ class QuadrupedEnv(VecEnv):
         return (self.episode_length_buf % steps == 0) & (self.episode_length_buf > 0)
 
     def _observe(self) -> None:
+        ang_vel, gravity = self.base_ang_vel, self.projected_gravity
+        if self.imu is not None:
+            ang_vel = (self.imu * ang_vel[:, None]).sum(dim=2)
+            gravity = (self.imu * gravity[:, None]).sum(dim=2)
         policy = policy_observation(
             self.cfg.observations.scales,
-            self.base_ang_vel,
-            self.projected_gravity,
-            self.joint_pos,
+            ang_vel,
+            gravity,
+            self.joint_pos + self.encoder_offset,
             self.joint_vel,
             self.action,
             self.commands.command,
         )
         if self.cfg.observations.noise_level > 0.0:
             policy += self._noise * self._draw(*policy.shape)
-        heights = self.terrain.height_map(self.grid, self.base_pos, self.heading)
+        heights = self.ground.height_map(self.grid, self.base_pos, self.heading)
         heights = self.cfg.height_map.normalised(heights)
         feet = self.footfalls
         privileged = privileged_observation(
@@ -372,6 +428,7 @@ class QuadrupedEnv(VecEnv):
             **gait_log(self.commands.command, self.base_lin_vel, self.power, self.footfalls),
             **episode_log(dones, self.fallen, self.unstable, self.invalid_action),
             **curriculum_log(factors, self.device),
+            **ground_log(self.ground),
         }
 
     def _draw(self, *shape: int) -> torch.Tensor:
@@ -383,6 +440,16 @@ class QuadrupedEnv(VecEnv):
         return torch.ones(self.num_envs, dtype=torch.bool, device=self.device)
 
     # -- set-up ----------------------------------------------------------------------------------
+
+    def _make_ground(self) -> Ground:
+        cfg = self.cfg.terrain
+        if set(cfg.shares) == {"flat"}:
+            return FlatGround()
+        ground = BoxGround(self.simulation, kind_of_robot(cfg, self.num_envs))
+        low, high = cfg.first_levels
+        unit = torch.rand(self.num_envs, generator=self.generator, device=self.device)
+        ground.level = low + (unit * (high - low + 1)).long()
+        return ground
 
     def _allocate(self) -> None:
         num_envs, device = self.num_envs, self.device
@@ -401,6 +468,16 @@ class QuadrupedEnv(VecEnv):
         self.step_count = 0
         self.unstable_count = 0
         self._estimated_phase = torch.zeros(num_envs, len(LEGS), device=device)
+
+
+def scene_of(cfg: QuadrupedEnvCfg) -> SceneCfg:
+    """Return a task's scene, with the boxes that its ground takes and the delays of its motors."""
+    robots = cfg.randomization
+    return dataclasses.replace(
+        cfg.scene,
+        ground_boxes=num_boxes(tuple(cfg.terrain.shares)),
+        longest_delay=robots.action_delay[1] if robots.enabled else 0.0,
+    )
 
 
 _PAST = ("action", "last_action", "action_before_last", "last_joint_vel")

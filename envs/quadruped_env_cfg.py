@@ -10,12 +10,13 @@ from mute.support.ranges import Range, check_ranges
 
 from .commands import CommandsCfg
 from .footfall import FootfallCfg
+from .height_map import HeightMapCfg
 from .observations import ObservationsCfg
 from .randomization import RandomizationCfg
 from .rewards import RewardsCfg
 from .scene import SceneCfg
 from .simulation import Engine
-from .terrain import HeightMapCfg
+from .terrain import TerrainCfg
 
 __all__ = ["QuadrupedEnvCfg"]
 
@@ -51,6 +52,8 @@ class QuadrupedEnvCfg:
     """Whether robots start in random directions."""
     scene: SceneCfg = field(default_factory=SceneCfg)
     """Robot, floor and solver."""
+    terrain: TerrainCfg = field(default_factory=TerrainCfg)
+    """The ground, and how its level follows what robots can do."""
     footfall: FootfallCfg = field(default_factory=FootfallCfg)
     """How contacts are debounced and landings measured."""
     height_map: HeightMapCfg = field(default_factory=HeightMapCfg)

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 
 from mute.support.ranges import Range, check_ordered, check_ranges
 
 from .simulation import Simulation
 
-__all__ = ["RandomizationCfg", "randomize_physics"]
+__all__ = ["RandomizationCfg", "RobotPhysics", "full_randomization", "randomize_physics"]
 
 _TRUNK_MASS = 5.204
 """Mass of the trunk before anything is added, kg; a configuration is checked without the model."""
@@ -36,6 +37,19 @@ class RandomizationCfg:
     """Factor on Kp and on Kd, drawn separately for each joint."""
     friction_loss: tuple[float, float] = (0.0, 0.5)
     """Dry friction of the joints, N m (published models lie between 0.1 and 1.0)."""
+    motor_strength: tuple[float, float] = (1.0, 1.0)
+    """Factor on the torque of all motors of a robot: batteries run down, and magnets get warm."""
+    armature: tuple[float, float] = (1.0, 1.0)
+    """Factor on the rotors' inertia, drawn for each joint."""
+    floor_stiffness: tuple[float, float] = (1.0, 1.0)
+    """Factor on the stiffness of the floor; its damping ratio stays."""
+    action_delay: tuple[float, float] = (0.0, 0.0)
+    """Time from an action to the set points that it stands for, s."""
+    encoder_offset: tuple[float, float] = (0.0, 0.0)
+    """What is added to what an encoder reads, which the motor controllers believe as well, rad;
+    drawn for each joint."""
+    imu_tilt: tuple[float, float] = (0.0, 0.0)
+    """Turn of the inertial sensor against the trunk, about each axis, rad."""
     push_interval: float = 8.0
     """Time between pushes, s; 0 for none."""
     push_velocity: float = 0.4
@@ -48,8 +62,34 @@ class RandomizationCfg:
             ValueError: If a range is empty, or a number is out of its own.
         """
         check_ranges(self, "env.randomization", _RANGES)
-        pairs = ("friction_factor", "added_mass", "com_offset", "gain_scale", "friction_loss")
+        pairs = [name for name in _RANGES if not name.startswith("push_")]
         check_ordered(self, "env.randomization", *pairs)
+
+
+def full_randomization(push_interval: float = 4.0) -> RandomizationCfg:
+    """Return robots that differ in everything: what a policy has to bear that leaves simulation.
+
+    Ranges are as wide as in DreamWaQ's training or wider: payload -1 to 3 kg, set points up to
+    20 ms late, friction from that of a wet floor on.
+
+    Args:
+        push_interval: Time between pushes, s; 0 for none.
+    """
+    return RandomizationCfg(
+        friction_factor=(0.375, 1.5625),  # 0.3 to 1.25 on a floor of 0.8
+        added_mass=(-1.0, 3.0),
+        com_offset=(-0.03, 0.03),
+        gain_scale=(0.9, 1.1),
+        friction_loss=(0.0, 0.5),
+        motor_strength=(0.9, 1.1),
+        armature=(0.8, 1.2),
+        floor_stiffness=(0.5, 2.0),
+        action_delay=(0.0, 0.02),
+        encoder_offset=(-0.02, 0.02),
+        imu_tilt=(-0.03, 0.03),
+        push_interval=push_interval,
+        push_velocity=0.5,
+    )
 
 
 _RANGES = {
@@ -58,18 +98,41 @@ _RANGES = {
     "com_offset": Range(-1.0, 1.0),
     "gain_scale": Range(0.0, 100.0),
     "friction_loss": Range(0.0, 1000.0),
+    "motor_strength": Range(0.0, 100.0, above=True),
+    "armature": Range(0.0, 100.0, above=True),
+    "floor_stiffness": Range(0.0, 1000.0, above=True),
+    "action_delay": Range(0.0, 1.0),
+    "encoder_offset": Range(-1.0, 1.0),
+    "imu_tilt": Range(-1.0, 1.0),
     "push_interval": Range(0.0, 1e12),
     "push_velocity": Range(0.0, 100.0),
 }
 
 
-PHYSICS_DIM = 5
-"""Width of what `randomize_physics` returns."""
+KNOWN = ("friction_factor", "added_mass", "com_offset", "motor_strength", "action_delay")
+"""What the critic knows of a robot's physics, in that order; the offset has three parts."""
+
+PHYSICS_DIM = 7
+"""Width of what the critic knows."""
+
+
+@dataclass
+class RobotPhysics:
+    """What differs between robots beside the fields of their models."""
+
+    known: torch.Tensor
+    """What the critic knows (`KNOWN`), each scaled to about [-1, 1]; 0 where all robots are alike.
+    Shape: (num_envs, PHYSICS_DIM)."""
+    encoder_offset: torch.Tensor
+    """What is added to what encoders read, rad. Shape: (num_envs, 12)."""
+    imu: torch.Tensor | None
+    """Rotation from the trunk's frame to that of the inertial sensor, None where they are one.
+    Shape: (num_envs, 3, 3)."""
 
 
 def randomize_physics(
     simulation: Simulation, cfg: RandomizationCfg, generator: torch.Generator
-) -> torch.Tensor:
+) -> RobotPhysics:
     """Draw the physics of every simulation.
 
     Args:
@@ -77,19 +140,23 @@ def randomize_physics(
         cfg: Ranges.
         generator: Source of the draws.
 
-    Returns:
-        What the critic may know: the friction's factor, added mass, centre of mass offset, each
-        scaled to about [-1, 1]. Shape: (num_envs, PHYSICS_DIM).
+    What all robots have alike is not drawn, so that it changes no other draw.
     """
-    num_envs, model = simulation.num_envs, simulation.model
+    num_envs, model, device = simulation.num_envs, simulation.model, simulation.device
+    exact = torch.zeros(num_envs, model.nu, device=device)
     if not cfg.enabled:
-        return torch.zeros(num_envs, PHYSICS_DIM, device=simulation.device)
+        return RobotPhysics(torch.zeros(num_envs, PHYSICS_DIM, device=device), exact, None)
 
     def draw(bounds: tuple[float, float], *shape: int) -> torch.Tensor:
         unit = torch.rand(
             num_envs, *shape, generator=generator, dtype=torch.float64, device=simulation.device
         )
         return bounds[0] + (bounds[1] - bounds[0]) * unit
+
+    def draw_if(bounds: tuple[float, float], neutral: float, *shape: int) -> torch.Tensor:
+        if bounds == (neutral, neutral):
+            return torch.full((num_envs, *shape), neutral, dtype=torch.float64, device=device)
+        return draw(bounds, *shape)
 
     friction = draw(cfg.friction_factor, 1)
     # The floor has priority and decides; the other geoms are written for whatever meets them.
@@ -103,16 +170,49 @@ def randomize_physics(
     simulation.field("body_ipos")[:, trunk] += com_offset
     _randomize_gains(simulation, draw(cfg.gain_scale, model.nu), draw(cfg.gain_scale, model.nu))
     simulation.field("dof_frictionloss")[:, 6:] = draw(cfg.friction_loss, model.nv - 6)
+    strength = draw_if(cfg.motor_strength, 1.0, 1)
+    _randomize_gains(simulation, strength, strength)
+    simulation.field("actuator_forcerange")[:] *= strength[:, :, None]
+    simulation.field("dof_armature")[:, 6:] *= draw_if(cfg.armature, 1.0, model.nv - 6)
+    _soften_floor(simulation, draw_if(cfg.floor_stiffness, 1.0, 1))
+    delay = draw_if(cfg.action_delay, 0.0, 1)
+    if cfg.action_delay[1] > 0.0:
+        simulation.field("actuator_delay")[:] = delay
+    offset = draw_if(cfg.encoder_offset, 0.0, model.nu)
+    turns = draw_if(cfg.imu_tilt, 0.0, 3)
     simulation.set_const()
     known = torch.cat(
         (
             _unit(friction, cfg.friction_factor),
             _unit(added_mass, cfg.added_mass),
             _unit(com_offset, cfg.com_offset),
+            _unit(strength, cfg.motor_strength),
+            _unit(delay, cfg.action_delay),
         ),
         dim=1,
     )
-    return known.float()
+    turned = cfg.imu_tilt != (0.0, 0.0)
+    return RobotPhysics(known.float(), offset.float(), _rotation(turns) if turned else None)
+
+
+def _soften_floor(simulation: Simulation, stiffness: torch.Tensor) -> None:
+    """Scale the stiffness of the floor's contacts: with a time constant goes its root's inverse."""
+    model = simulation.model
+    floor = np.flatnonzero(model.geom_bodyid == 0)
+    # Below two physics steps MuJoCo would stretch the time constant without a word (refsafe).
+    shortest = 2.0 * model.opt.timestep
+    solref = simulation.field("geom_solref")
+    time = (solref[:, floor, 0] / stiffness.sqrt()).clamp(min=shortest)
+    solref[:, floor, 0] = time.to(solref.dtype)
+
+
+def _rotation(turns: torch.Tensor) -> torch.Tensor:
+    """Return rotations by turns about x, y and z, rad. Shape: (n, 3) -> (n, 3, 3)."""
+    skew = torch.zeros(len(turns), 3, 3, dtype=turns.dtype, device=turns.device)
+    x, y, z = turns.unbind(dim=1)
+    skew[:, 0, 1], skew[:, 0, 2], skew[:, 1, 2] = -z, y, -x
+    skew[:, 1, 0], skew[:, 2, 0], skew[:, 2, 1] = z, -y, x
+    return torch.linalg.matrix_exp(skew).float()
 
 
 def _randomize_gains(simulation: Simulation, kp: torch.Tensor, kd: torch.Tensor) -> None:

@@ -7,6 +7,7 @@ model is left to `envs.simulation`, finding what the sensors read to `envs.senso
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -45,6 +46,12 @@ Look = Literal["primitives", "menagerie"]
 Integrator = Literal["euler", "implicit", "implicitfast"]
 Cone = Literal["pyramidal", "elliptic"]
 Solver = Literal["newton", "cg"]
+
+GROUND_BOX = "ground_{}"
+"""Names of the boxes that ground is laid of, by their number."""
+
+_QUARTER_TURN = (0.5**0.5, 0.0, 0.0, 0.5**0.5)
+"""About the vertical, which leaves the normal exactly vertical."""
 
 _PATCH_THICKNESS = 0.1
 """Thickness of a patch of floor, in m; its top is level."""
@@ -135,6 +142,13 @@ class SceneCfg:
     floor_patches: tuple[FloorPatch, ...] = ()
     """Floors side by side, level with each other; none leaves one endless floor."""
 
+    ground_boxes: int = 0
+    """Boxes for ground of its own under each robot, see `envs.terrain`; the floor is what they
+    stand on."""
+
+    longest_delay: float = 0.0
+    """Longest time from an action to its set points that a motor can have, s."""
+
     foot_forces: bool = False
     """Whether to measure what sound needs and walking does not: contact forces and turning rates
     of the feet."""
@@ -160,6 +174,8 @@ _SCENE_RANGES = {
     "iterations": Range(1, 10**6, whole=True),
     "ls_iterations": Range(1, 10**6, whole=True),
     "floor_friction": Range(0.0, 10.0, above=True),
+    "ground_boxes": Range(0, 1000, whole=True),
+    "longest_delay": Range(0.0, 1.0),
 }
 
 
@@ -197,8 +213,12 @@ def make_spec(cfg: SceneCfg, pictured: bool = True) -> mujoco.MjSpec:
     _add_floor(spec, cfg)
     for patch in cfg.floor_patches:
         _add_patch(spec, patch)
+    for index in range(cfg.ground_boxes):
+        _add_ground_box(spec, cfg, index)
     _add_foot_sensors(spec)
     _add_contact_sensors(spec)
+    if cfg.longest_delay:
+        _delay_motors(spec, cfg)
     if cfg.foot_forces:
         _add_force_sensors(spec)
     if pictured and cfg.look == "menagerie":
@@ -287,6 +307,8 @@ def _add_floor(spec: mujoco.MjSpec, cfg: SceneCfg) -> None:
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         # Under patches the endless floor is but a backdrop: level, it would touch as well.
         pos=(0.0, 0.0, -_PATCH_THICKNESS if cfg.floor_patches else 0.0),
+        # Of a shape whose frame is the world's own, MuJoCo keeps no place that could be moved.
+        quat=_QUARTER_TURN if cfg.ground_boxes else (1.0, 0.0, 0.0, 0.0),
         size=(0.0, 0.0, 0.05),
         material="floor",
         contype=1,
@@ -314,6 +336,24 @@ def _add_patch(spec: mujoco.MjSpec, patch: FloorPatch) -> None:
         priority=1,  # as for the endless floor
         friction=(patch.friction, 0.02, 0.01),
         solref=patch.solref,
+    )
+
+
+def _add_ground_box(spec: mujoco.MjSpec, cfg: SceneCfg, index: int) -> None:
+    """Add a box out of the way below the floor; `envs.terrain` lays it."""
+    spec.worldbody.add_geom(
+        name=GROUND_BOX.format(index),
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=(0.0, 0.0, -10.0),
+        quat=_QUARTER_TURN,  # as for the floor
+        size=(0.1, 0.1, 0.1),
+        rgba=(0.62, 0.60, 0.56, 1.0),
+        contype=1,
+        conaffinity=0,
+        condim=3,
+        priority=1,
+        friction=(cfg.floor_friction, 0.02, 0.01),
+        solref=cfg.floor_solref,
     )
 
 
@@ -350,6 +390,13 @@ def add_contact_sensor(spec: mujoco.MjSpec, geom: str) -> None:
         # What to report (found), how to choose among contacts (any), how many to report.
         intprm=(1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1),
     )
+
+
+def _delay_motors(spec: mujoco.MjSpec, cfg: SceneCfg) -> None:
+    """Let motors keep their last set points, of which a delay takes an earlier one."""
+    for actuator in spec.actuators:
+        actuator.delay = cfg.longest_delay
+        actuator.nsample = math.ceil(cfg.longest_delay / cfg.timestep - 1e-9) + 1
 
 
 def _add_force_sensors(spec: mujoco.MjSpec) -> None:

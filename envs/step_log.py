@@ -7,8 +7,9 @@ from torch import Tensor
 
 from .curriculum import Curriculum
 from .footfall import Footfalls
+from .terrain import BoxGround, Ground
 
-__all__ = ["curriculum_log", "episode_log", "gait_log"]
+__all__ = ["curriculum_log", "episode_log", "gait_log", "ground_log"]
 
 
 def gait_log(
@@ -62,4 +63,15 @@ def curriculum_log(factors: Curriculum, device: torch.device | str) -> dict[str,
     return {
         f"Curriculum/{name}": torch.full((), factor, device=device)
         for name, factor in factors._asdict().items()
+    }
+
+
+def ground_log(ground: Ground) -> dict[str, Tensor]:
+    """Return the mean level of each kind of ground that has levels."""
+    if not isinstance(ground, BoxGround):
+        return {}
+    return {
+        f"Ground/level_{name}": ground.level[ground.kind == index].float().mean()
+        for index, name in enumerate(ground.kinds)
+        if name != "flat"
     }

@@ -9,8 +9,8 @@ import copy
 from dataclasses import asdict
 from typing import Any
 
+from mute.envs.height_map import HeightMapCfg
 from mute.envs.rewards import RewardTermCfg, paper_terms, reward_term
-from mute.envs.terrain import HeightMapCfg
 
 __all__ = ["MOVED", "check_resumable", "earlier_terms", "upgraded"]
 

@@ -16,6 +16,7 @@ from mute.command_lines.evaluate_noise import (
     sweep_speed,
 )
 from mute.command_lines.evaluate_reliability import ReliabilityArgs, reliability
+from mute.command_lines.evaluate_terrain import TerrainArgs, terrain
 from mute.command_lines.evaluate_walk import WalkArgs, walk
 from mute.support.errors import MuteError
 
@@ -28,6 +29,7 @@ _COMMANDS: dict[str, tuple[type, Callable[[Any], int | None], str]] = {
     "sweep-speed": (SweepSpeedArgs, sweep_speed, "modelled noise levels against the actual speed"),
     "sweep-beta": (SweepBetaArgs, sweep_beta, "modelled noise levels against the quiet factor"),
     "walk": (WalkArgs, walk, "a long walk over mixed floors, with a map of the levels"),
+    "terrain": (TerrainArgs, terrain, "every kind of ground and level, and what is known of it"),
     "reliability": (ReliabilityArgs, reliability, "starts, follows, stands, heeds beta, or not"),
 }
 

@@ -41,10 +41,13 @@ from mute.controllers.command import COMMAND_LIMITS, Command
 from mute.controllers.learned import Policy
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.scene import Look
+from mute.envs.terrain import KINDS, TerrainCfg
+from mute.envs.terrain.figures import LEVELS
 from mute.evaluation.session import Session
 from mute.evaluation.trials import evaluation_cfg, from_the_stance
 from mute.live.keys import KEYS_HELP
 from mute.rendering.backend import has_display, why_no_window
+from mute.rendering.height_dots import HeightDots
 from mute.rendering.sound_track import temporary_sound
 from mute.rendering.video import Video
 from mute.support.errors import MuteError
@@ -93,6 +96,11 @@ class PlayArgs(PolicyArgs):
     """How robots begin: standing, at rest in the exact stance (several robots each a little beside
     it), with the command half a second later; moving, near the stance with a little speed in any
     direction, as in training."""
+    terrain: str = "flat"
+    """Ground to walk on: flat, slopes, uneven, blocks, stairs, stairs_down or rooms. But on flat
+    ground, pictures have dots: green where it is, orange where the policy takes it to be."""
+    level: int = 2
+    """How difficult it is, 0 to 4."""
     surface: str | None = None
     """Floor to walk on and to hear, with physics at 1 ms: wood, parquet, laminate, carpet,
     tile or concrete. Unless given, training's floor and physics, with a level (modelled, sounding
@@ -122,6 +130,9 @@ class PlayArgs(PolicyArgs):
             check_option("seconds", self.seconds, Range(0.0, LONGEST_WALK, above=True))
         check_option("num-envs", self.num_envs, MANY_ROBOTS)
         check_seed(self.seed)
+        check_option("level", self.level, Range(0, LEVELS - 1, whole=True))
+        if self.terrain not in KINDS:
+            raise MuteError(f"--terrain must be one of {', '.join(KINDS)}, got {self.terrain!r}")
         if self.surface is not None and self.surface not in FLOORS:
             allowed = ", ".join(FLOORS)
             raise MuteError(f"--surface must be one of {allowed}, got {self.surface!r}")
@@ -239,7 +250,9 @@ def _make_env(args: PlayArgs, policy: Policy, seconds: float) -> QuadrupedEnv:
     Raises:
         MuteError: If the policy's rate goes with no floor.
     """
-    cfg = evaluation_cfg(policy.cfg.env, args.num_envs, seconds, args.seed)
+    levels = (args.level, args.level)
+    terrain = TerrainCfg(kind=args.terrain, first_levels=levels, curriculum=False)
+    cfg = evaluation_cfg(policy.cfg.env, args.num_envs, seconds, args.seed, terrain=terrain)
     if args.begin == "standing":
         # Of several, each stands a little differently.
         joint_noise = cfg.initial_joint_noise if args.num_envs > 1 else 0.0
@@ -288,11 +301,16 @@ def _walk_in_window(args: PlayArgs, session: Session) -> None:
     print(KEYS_HELP, flush=True)
     num_steps = None if args.seconds is None else _num_steps(args, session)
     with session.listener or contextlib.nullcontext():
-        watch(session, num_steps, shown)
+        watch(session, num_steps, shown, _height_dots(args, session))
+
+
+def _height_dots(args: PlayArgs, session: Session) -> HeightDots | None:
+    """Return the heights to draw, where they differ."""
+    return None if args.terrain == "flat" else HeightDots(session.env, session.controller)
 
 
 def _walk_on_video(args: PlayArgs, session: Session, path: Path) -> None:
-    video = Video(path, session.env, args.sound)
+    video = Video(path, session.env, args.sound, dots=_height_dots(args, session))
     try:
         with video:
             _walk_in_text(args, session, video.record)

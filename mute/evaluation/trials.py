@@ -12,13 +12,19 @@ from mute.controllers.controller import Controller
 from mute.envs.commands import CommandSampler, CommandsCfg
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.terrain import TerrainCfg
 from mute.evaluation.gait import GaitMeter
 
 __all__ = ["command_sampler", "evaluation_cfg", "from_the_stance", "run_trial"]
 
 
 def evaluation_cfg(
-    cfg: QuadrupedEnvCfg, num_envs: int, seconds: float, seed: int, randomized: bool = False
+    cfg: QuadrupedEnvCfg,
+    num_envs: int,
+    seconds: float,
+    seed: int,
+    randomized: bool = False,
+    terrain: TerrainCfg | None = None,
 ) -> QuadrupedEnvCfg:
     """Return a task's environment for measuring.
 
@@ -32,12 +38,14 @@ def evaluation_cfg(
         seed: Seed of the initial states.
         randomized: Keep the training's physics randomisation, pushes and sensor noise; otherwise
             the model as it is, no pushes, no noise.
+        terrain: Ground to measure on; flat unless given, whatever the policy was trained on.
     """
     measured = dataclasses.replace(
         cfg,
         num_envs=num_envs,
         engine="auto",
         seed=seed,
+        terrain=terrain or TerrainCfg(),
         # One step longer than the trial, so that its last step is measured and not reset.
         episode_length=seconds + cfg.step_dt,
         commands=dataclasses.replace(cfg.commands, resampling_time=10.0 * seconds + 10.0),

@@ -19,6 +19,7 @@ import mujoco.viewer
 from mute.envs.picture import Picture
 from mute.evaluation.session import Session
 from mute.live.keys import press
+from mute.rendering.height_dots import HeightDots
 from mute.support.errors import MuteError
 
 __all__ = ["watch"]
@@ -30,20 +31,26 @@ _CLOSING_TIME = 5.0
 """Longest time that a window may take to close, s."""
 
 
-def watch(session: Session, num_steps: int | None, captions: Callable[[], dict[str, str]]) -> None:
+def watch(
+    session: Session,
+    num_steps: int | None,
+    captions: Callable[[], dict[str, str]],
+    dots: HeightDots | None = None,
+) -> None:
     """Walk in a window until it is closed or the time is over.
 
     Args:
         session: The walk; robot 0 is shown.
         num_steps: Control steps to walk; None for as long as the window is open.
         captions: Gives the figures to show in the window, by name; asked once a second.
+        dots: Heights to draw as dots.
 
     Raises:
         MuteError: If this Python cannot open windows (on macOS, that is mjpython's alone).
     """
     env, keys = session.env, queue.SimpleQueue[int]()
     picture = Picture(env)
-    picture.show(env.simulation.qpos[0])
+    picture.show(0)
     per_second = round(1.0 / env.step_dt)
     due = time.perf_counter()
     with _open(picture.model, picture.data, keys.put) as viewer:
@@ -55,7 +62,10 @@ def watch(session: Session, num_steps: int | None, captions: Callable[[], dict[s
                 press(session, keys.get())
             session.step()
             with viewer.lock():
-                picture.show(env.simulation.qpos[0])
+                picture.show(0)
+                if dots is not None:
+                    viewer.user_scn.ngeom = 0
+                    dots.add_to(viewer.user_scn)
             if session.steps % per_second == 0:
                 shown = captions()
                 viewer.set_texts((None, None, "\n".join(shown), "\n".join(shown.values())))

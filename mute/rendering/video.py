@@ -22,6 +22,7 @@ import numpy as np
 from mute.envs.picture import Picture
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.rendering.encoder import ffmpeg_program
+from mute.rendering.height_dots import HeightDots
 from mute.rendering.sound_track import add_sound
 from mute.support.errors import MuteError
 from mute.support.threads import core_share
@@ -53,6 +54,7 @@ class Video:
         sound: Path | None = None,
         robot: int = 0,
         start: float = 0.0,
+        dots: HeightDots | None = None,
     ) -> None:
         """Prepare to render and make the file's directory; the file itself begins on entering.
 
@@ -62,6 +64,7 @@ class Video:
             sound: WAV file of the same walk, complete before the video is.
             robot: Index of the robot to follow.
             start: Time after which the film begins, s.
+            dots: Heights to draw as dots.
 
         Raises:
             MuteError: If the path cannot be a video, or nothing renders or encodes.
@@ -74,6 +77,7 @@ class Video:
         self._env = env
         self._sound = sound
         self._robot = robot
+        self._dots = dots
         ffmpeg_program()
         self._temporary = _temporary_name(path)
         self._steps = -round(start / env.step_dt)
@@ -170,14 +174,23 @@ class Video:
 
     def _picture(self) -> np.ndarray:
         """Return the robot as it stands now. Shape: (height, width, 3), uint8."""
-        self._robot_picture.show(self._env.simulation.qpos[self._robot])
+        self._robot_picture.show(self._robot)
         data = self._robot_picture.data
         if not self._pictures:  # the view of a walk is the same whatever way it begins
             forward = self._env.heading[self._robot]
             self._camera.azimuth = _AZIMUTH + math.degrees(math.atan2(forward[1], forward[0]))
-        self._camera.lookat[:] = (*data.qpos[:2], _LOOK_AT_HEIGHT)
+        height = _LOOK_AT_HEIGHT + self._ground_height()
+        self._camera.lookat[:] = (*data.qpos[:2], height)
         self._renderer.update_scene(data, self._camera)
+        if self._dots is not None:
+            self._dots.add_to(self._renderer.scene)
         return self._renderer.render()
+
+    def _ground_height(self) -> float:
+        """Return the mean height of the ground below the robot's map, m."""
+        env = self._env
+        above = env.ground.height_map(env.grid, env.base_pos, env.heading)[self._robot].mean()
+        return float(env.base_pos[self._robot, 2] - above)
 
     def _discard(self) -> None:
         with contextlib.suppress(OSError):

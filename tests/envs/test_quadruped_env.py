@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from mute.envs.commands import CommandsCfg
+from mute.envs.height_map import HeightMapCfg
 from mute.envs.observations import OBSERVATION_WIDTHS, ObservationsCfg, slices
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
@@ -15,7 +16,6 @@ from mute.envs.randomization import RandomizationCfg
 from mute.envs.rewards import RewardsCfg, reward_term
 from mute.envs.scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS
 from mute.envs.sensors import sensor_slice
-from mute.envs.terrain import HeightMapCfg
 
 POLICY = slices(OBSERVATION_WIDTHS)
 QUIET = {"observations": ObservationsCfg(noise_level=0.0)}

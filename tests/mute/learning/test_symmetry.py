@@ -11,11 +11,11 @@ from tensordict import TensorDict
 
 from mute.checkpoint import CheckpointError
 from mute.config import AgentCfg
+from mute.envs.height_map import HeightMapCfg
 from mute.envs.observations import OBS_DIM, ObservationsCfg
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
-from mute.envs.terrain import HeightMapCfg
 from mute.learning.estimated_env import estimate_group, go_group
 from mute.learning.runner import MuteRunner
 from mute.learning.symmetry import FEET, JOINTS, OBSERVATION, POLAR, groups, heights

@@ -1,15 +1,14 @@
-"""The ground under the robot: heights where the robot wants to know them."""
+"""The grid around the robot whose heights make the height map."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import torch
 
 from mute.support.ranges import Range, check_ranges
 
-__all__ = ["FlatTerrain", "HeightMapCfg", "Terrain"]
+__all__ = ["HeightMapCfg"]
 
 
 @dataclass
@@ -65,47 +64,6 @@ _RANGES = {
     "offset": Range(-10.0, 10.0),
     "scale": Range(0.001, 10.0),
 }
-
-
-class Terrain(ABC):
-    """Ground that has one height at every point."""
-
-    @abstractmethod
-    def height(self, points: torch.Tensor) -> torch.Tensor:
-        """Return the ground height at world points, m. Shape: (..., 2) -> (...)."""
-
-    def height_map(
-        self, grid: torch.Tensor, base_pos: torch.Tensor, heading: torch.Tensor
-    ) -> torch.Tensor:
-        """Return the trunk's height above the ground at each grid point, m.
-
-        Args:
-            grid: Points in the heading frame, m. Shape: (num_points, 2).
-            base_pos: Trunk position in the world, m. Shape: (num_envs, 3).
-            heading: Unit vector of the trunk's x axis in the horizontal plane.
-                Shape: (num_envs, 2).
-
-        Returns:
-            Heights, maybe a view of `base_pos`. Shape: (num_envs, num_points).
-        """
-        cos, sin = heading[:, :1], heading[:, 1:]
-        along, across = grid[:, 0], grid[:, 1]
-        offset = torch.stack((cos * along - sin * across, sin * along + cos * across), dim=-1)
-        return base_pos[:, 2:3] - self.height(base_pos[:, None, :2] + offset)
-
-
-class FlatTerrain(Terrain):
-    """An endless plane at height zero."""
-
-    def height(self, points: torch.Tensor) -> torch.Tensor:
-        """Return zero everywhere, see `Terrain.height`."""
-        return torch.zeros_like(points[..., 0])
-
-    def height_map(
-        self, grid: torch.Tensor, base_pos: torch.Tensor, heading: torch.Tensor
-    ) -> torch.Tensor:
-        """Return the trunk's height for every point: where these lie does not matter here."""
-        return base_pos[:, 2:3].expand(-1, len(grid))
 
 
 def _centred(extent: float, spacing: float, device: torch.device | str) -> torch.Tensor:

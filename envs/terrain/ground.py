@@ -1,0 +1,174 @@
+"""The ground of every robot: its kind, level and key, and the boxes that are laid around it."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
+
+import torch
+
+from mute.envs.scene import GROUND_BOX
+from mute.envs.simulation import Simulation
+
+from .figures import TREAD
+from .kinds import KINDS, Kind
+from .layout import Layout
+
+__all__ = ["BoxGround", "FlatGround", "Ground", "num_boxes"]
+
+
+def num_boxes(kinds: Iterable[str], drawn: bool = False) -> int:
+    """Return how many boxes a model needs for these kinds of ground, to be stepped or drawn."""
+    return max(
+        (KINDS[name].wide_boxes if drawn else KINDS[name].boxes for name in kinds), default=0
+    )
+
+
+class Ground(ABC):
+    """Ground that has one height at every point."""
+
+    @abstractmethod
+    def height(self, points: torch.Tensor) -> torch.Tensor:
+        """Return the ground height at world points, m.
+
+        Args:
+            points: Of each robot. Shape: (num_envs, ..., 2).
+
+        Returns:
+            Shape: (num_envs, ...).
+        """
+
+    def heading(self, draw: torch.Tensor) -> torch.Tensor:
+        """Return in which direction each robot begins, rad.
+
+        Args:
+            draw: Random numbers in [-1, 1). Shape: (num_envs,).
+        """
+        return math.pi * draw
+
+    def height_map(
+        self, grid: torch.Tensor, base_pos: torch.Tensor, heading: torch.Tensor
+    ) -> torch.Tensor:
+        """Return the trunk's height above the ground at each grid point, m.
+
+        Args:
+            grid: Points in the heading frame, m. Shape: (num_points, 2).
+            base_pos: Trunk position in the world, m. Shape: (num_envs, 3).
+            heading: Unit vector of the trunk's x axis in the horizontal plane.
+                Shape: (num_envs, 2).
+
+        Returns:
+            Heights, maybe a view of `base_pos`. Shape: (num_envs, num_points).
+        """
+        cos, sin = heading[:, :1], heading[:, 1:]
+        along, across = grid[:, 0], grid[:, 1]
+        offset = torch.stack((cos * along - sin * across, sin * along + cos * across), dim=-1)
+        return base_pos[:, 2:3] - self.height(base_pos[:, None, :2] + offset)
+
+
+class FlatGround(Ground):
+    """An endless plane at height zero."""
+
+    def height(self, points: torch.Tensor) -> torch.Tensor:
+        """Return zero everywhere, see `Ground.height`."""
+        return torch.zeros_like(points[..., 0])
+
+    def height_map(
+        self, grid: torch.Tensor, base_pos: torch.Tensor, heading: torch.Tensor
+    ) -> torch.Tensor:
+        """Return the trunk's height for every point: where these lie does not matter here."""
+        return base_pos[:, 2:3].expand(-1, len(grid))
+
+
+class BoxGround(Ground):
+    """Ground of boxes, each robot's its own, that are laid anew as it walks."""
+
+    def __init__(self, simulation: Simulation, kind_of_robot: Sequence[str]) -> None:
+        """Take hold of the boxes of the model; `renew` begins.
+
+        Args:
+            simulation: The engine, whose model has `num_boxes` boxes named as `scene.GROUND_BOX`.
+            kind_of_robot: Each robot's kind of ground.
+        """
+        model, device = simulation.model, simulation.device
+        num_envs = simulation.num_envs
+        self.kinds = tuple(dict.fromkeys(kind_of_robot))
+        """Kinds of ground that there are."""
+        self.kind = torch.tensor([self.kinds.index(name) for name in kind_of_robot], device=device)
+        """Each robot's kind, an index into `kinds`. Shape: (num_envs,)."""
+        self.level = torch.zeros(num_envs, dtype=torch.long, device=device)
+        """Each robot's level. Shape: (num_envs,)."""
+        self.key = torch.zeros(num_envs, dtype=torch.long, device=device)
+        """What makes each robot's ground its own. Shape: (num_envs,)."""
+        self._robots = [torch.nonzero(self.kind == index)[:, 0] for index in range(len(self.kinds))]
+        self._plane = model.geom("floor").id
+        widest = torch.tensor([KINDS[name].max_heading for name in self.kinds], device=device)
+        self._max_heading = widest[self.kind]
+        names = (GROUND_BOX.format(index) for index in range(num_boxes(self.kinds)))
+        ids = [model.geom(name).id for name in names]
+        self._boxes = torch.tensor(ids, dtype=torch.long, device=device)
+        self._cell = torch.full((num_envs, 2), torch.inf, device=device)
+        self._pos, self._size, self._quat, self._aabb, self._rbound = (
+            simulation.field(name)
+            for name in ("geom_pos", "geom_size", "geom_quat", "geom_aabb", "geom_rbound")
+        )
+        self._quat[:, self._boxes] = 0.0
+        self._quat[:, self._boxes, 0] = 1.0
+
+    def height(self, points: torch.Tensor) -> torch.Tensor:
+        """Return the ground height at world points, m, see `Ground.height`."""
+        flat = points.reshape(len(points), -1, 2)
+        heights = torch.empty_like(flat[..., 0])
+        for name, robots in zip(self.kinds, self._robots, strict=True):
+            level, key = self.level[robots], self.key[robots]
+            heights[robots] = KINDS[name].height(flat[robots], level, key)
+        return heights.reshape(points.shape[:-1])
+
+    def heading(self, draw: torch.Tensor) -> torch.Tensor:
+        """Return in which direction each robot begins, see `Ground.heading`."""
+        # The sign says whether up or down the x axis, the size how far beside it.
+        beside = self._max_heading * (2.0 * draw.abs() - 1.0)
+        limited = beside + torch.where(draw < 0.0, math.pi, 0.0)
+        return torch.where(self._max_heading < math.pi, limited, math.pi * draw)
+
+    def lay(self, xy: torch.Tensor, anew: torch.Tensor | None = None) -> None:
+        """Lay the boxes around the robots that have come into another cell.
+
+        Args:
+            xy: Where each robot is in the world, m. Shape: (num_envs, 2).
+            anew: Robots whose ground is another one than before. Shape: (num_envs,), bool.
+        """
+        cell = torch.floor(xy / TREAD)
+        due = (cell != self._cell).any(dim=1)
+        if anew is not None:
+            due |= anew
+        self._cell = torch.where(due[:, None], cell, self._cell)
+        for name, robots in zip(self.kinds, self._robots, strict=True):
+            chosen = robots[due[robots]]
+            if KINDS[name].boxes and len(chosen):
+                self._lay(KINDS[name], chosen, xy[chosen])
+
+    def drawn(self, robot: int, xy: torch.Tensor) -> tuple[Layout, float]:
+        """Return the boxes of a robot's ground as far as one looks, and the height of its plane.
+
+        Args:
+            robot: Its index.
+            xy: Where it is in the world, m. Shape: (2,).
+        """
+        kind = KINDS[self.kinds[int(self.kind[robot])]]
+        level, key = self.level[robot, None].cpu(), self.key[robot, None].cpu()
+        return kind.lay(xy.cpu()[None], level, key, wide=True), float(kind.base(level))
+
+    def _lay(self, kind: Kind, robots: torch.Tensor, xy: torch.Tensor) -> None:
+        level, dtype = self.level[robots], self._pos.dtype
+        laid = kind.lay(xy, level, self.key[robots])
+        at = (robots[:, None], self._boxes[: kind.boxes])
+        half = laid.half.to(dtype)
+        self._pos[robots, self._plane, 2] = kind.base(level).to(dtype)
+        self._pos[at] = laid.pos.to(dtype)
+        self._size[at] = half
+        self._aabb[(*at, slice(3, None))] = half
+        self._rbound[at] = half.norm(dim=-1)
+        self._quat[(*at, 0)] = torch.cos(0.5 * laid.pitch).to(dtype)
+        self._quat[(*at, 2)] = torch.sin(0.5 * laid.pitch).to(dtype)

@@ -1,0 +1,167 @@
+"""How robots get over a kind of ground at a level, and what they know of it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+import torch
+from tensordict import TensorDict
+
+from mute.controllers import LearnedController
+from mute.controllers.learned import Policy
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.randomization import full_randomization
+from mute.envs.scene import FOOT_RADIUS
+from mute.envs.terrain import TerrainCfg
+from mute.evaluation.estimation_errors import EstimationMeter
+from mute.evaluation.trials import evaluation_cfg, run_trial
+
+__all__ = ["Crossing", "HeightBaselines", "cross", "crossing_cfg"]
+
+_ENOUGH = 0.8
+"""Share of the commanded distance from which on a robot got across."""
+
+
+@dataclass
+class Crossing:
+    """Figures of one kind of ground at one level."""
+
+    kind: str
+    """Kind of ground."""
+    level: int
+    """Its level."""
+    episodes: int
+    """Robots, one episode each."""
+    success: float
+    """Share of them that did not fall and got more than 80 % of the commanded distance."""
+    falls: float
+    """Share that fell."""
+    made: float
+    """Distance along the command over the commanded one, mean."""
+    velocity_rmse: float
+    """Estimator: root of the mean squared error of the velocity over axes, m/s."""
+    height_rmse: float
+    """Estimator: root mean squared error of the height map, m."""
+    height_rmse_flat: float
+    """The same of a map that is level at the height of the feet on the ground, m."""
+    height_rmse_mean: float
+    """The same of the mean map of this kind and level, m."""
+    phase_mae: float
+    """Estimator: mean absolute error of the phase."""
+
+    def as_dict(self) -> dict[str, float | int | str]:
+        """Return the figures by name."""
+        return asdict(self)
+
+
+class HeightBaselines:
+    """What two trivial predictors of the height map would have got wrong.
+
+    One takes the ground to be level at the mean height of the feet that stand, which a robot can
+    tell from its joints and its tilt. The other always says the mean map, which is known only
+    afterwards: it is as good as any that does not look.
+    """
+
+    def __init__(self, env: QuadrupedEnv) -> None:
+        """Start at zero."""
+        self._env = env
+        points = len(env.grid)
+        self._flat = 0.0
+        self._sum = torch.zeros(points, dtype=torch.float64)
+        self._squares = torch.zeros(points, dtype=torch.float64)
+        self._steps = 0
+
+    def update(self) -> None:
+        """Take in where the robots are now."""
+        env = self._env
+        heights = env.ground.height_map(env.grid, env.base_pos, env.heading).double()
+        feet = env.foot_pos[:, :, 2].double() - FOOT_RADIUS
+        down = env.footfalls.contact.double()
+        # Of a robot in the air, the mean of all four.
+        weight = torch.where(down.sum(dim=1, keepdim=True) > 0.0, down, torch.ones_like(down))
+        ground = (feet * weight).sum(dim=1) / weight.sum(dim=1)
+        level = (env.base_pos[:, 2] - ground)[:, None]
+        self._flat += float((heights - level).square().mean())
+        self._sum += heights.mean(dim=0)
+        self._squares += heights.square().mean(dim=0)
+        self._steps += 1
+
+    def errors(self) -> tuple[float, float]:
+        """Return the root mean squared errors of the level map and of the mean map, m."""
+        mean = self._sum / self._steps
+        spread = (self._squares / self._steps - mean.square()).clamp(min=0.0)
+        return (self._flat / self._steps) ** 0.5, float(spread.mean()) ** 0.5
+
+
+def crossing_cfg(
+    policy: Policy, kind: str, level: int, episodes: int, seconds: float, seed: int
+) -> QuadrupedEnvCfg:
+    """Return the environment: robots that differ in everything, on one kind of ground.
+
+    Args:
+        policy: What walks.
+        kind: Kind of ground, of `envs.terrain.KINDS`.
+        level: Its level.
+        episodes: Number of robots.
+        seconds: Length of an episode, s.
+        seed: Of ground, robots, first states and noise.
+    """
+    terrain = TerrainCfg(kind=kind, first_levels=(level, level), curriculum=False)
+    robots = full_randomization(push_interval=0.0)
+    env = dataclasses.replace(policy.cfg.env, randomization=robots)
+    return evaluation_cfg(env, episodes, seconds, seed, randomized=True, terrain=terrain)
+
+
+def cross(
+    policy: Policy,
+    cfg: QuadrupedEnvCfg,
+    speed: float,
+    beta: float,
+    seconds: float,
+    on_step: Callable[[], None] = lambda: None,
+) -> Crossing:
+    """Walk ahead for one episode, and return the figures.
+
+    Args:
+        policy: What walks.
+        cfg: See `crossing_cfg`.
+        speed: Commanded forward speed, m/s.
+        beta: Quiet factor.
+        seconds: Length of the episode, s.
+        on_step: Is called after each control step.
+    """
+    env = QuadrupedEnv(cfg)
+    controller = LearnedController(policy, cfg.num_envs)
+    estimation, baselines = EstimationMeter(env, controller), HeightBaselines(env)
+    made = torch.zeros(cfg.num_envs)
+    fallen = torch.zeros(cfg.num_envs, dtype=torch.bool)
+
+    def watch(observations: TensorDict, dones: torch.Tensor) -> None:
+        estimation(observations, dones)
+        baselines.update()
+        fallen.logical_or_(env.fallen)
+        # Of who has just begun anew, nothing more counts: it fell.
+        made.add_(torch.where(dones, 0.0, env.step_dt * env.base_lin_vel[:, 0]))
+        on_step()
+
+    command = torch.tensor((speed, 0.0, 0.0, beta))
+    run_trial(env, controller, command, round(seconds / env.step_dt), watch)
+    share = made / (speed * seconds)
+    errors = estimation.errors()
+    flat, mean = baselines.errors()
+    return Crossing(
+        kind=cfg.terrain.kind,
+        level=cfg.terrain.first_levels[0],
+        episodes=cfg.num_envs,
+        success=float((~fallen & (share > _ENOUGH)).double().mean()),
+        falls=float(fallen.double().mean()),
+        made=float(share.mean()),
+        velocity_rmse=errors.velocity_rmse,
+        height_rmse=errors.height_rmse,
+        height_rmse_flat=flat,
+        height_rmse_mean=mean,
+        phase_mae=errors.phase_mae,
+    )

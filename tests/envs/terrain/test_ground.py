@@ -1,0 +1,147 @@
+"""Robots on ground of their own: where they begin, what they touch, and how it goes on."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import mujoco
+import numpy as np
+import pytest
+import torch
+
+from mute.envs.batch_simulation import BatchSimulation
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.randomization import RandomizationCfg
+from mute.envs.scene import FOOT_RADIUS, SceneCfg, build_scene
+from mute.envs.terrain import GROUNDS, KINDS, BoxGround, TerrainCfg, kind_of_robot
+
+
+def _env(kind: str, num_envs: int = 10, **fields) -> QuadrupedEnv:
+    cfg = QuadrupedEnvCfg(
+        num_envs=num_envs,
+        num_threads=1,
+        randomization=RandomizationCfg(enabled=False),
+        terrain=TerrainCfg(kind=kind, first_levels=(0, 4)),
+    )
+    return QuadrupedEnv(dataclasses.replace(cfg, **fields))
+
+
+def _ground(env: QuadrupedEnv) -> BoxGround:
+    assert isinstance(env.ground, BoxGround)
+    return env.ground
+
+
+def _walk(env: QuadrupedEnv, steps: int, generator: torch.Generator) -> None:
+    for _ in range(steps):
+        env.step(2.0 * torch.randn(env.num_envs, 12, generator=generator))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_foot_begins_in_the_ground_and_one_stands_on_it(kind):
+    env = _env(kind, 40)
+    for _ in range(3):
+        feet = env._sensors.foot_pos
+        clearance = feet[:, :, 2] - FOOT_RADIUS - env.ground.height(feet[:, :, :2])
+        assert float(clearance.min()) > -1e-5
+        assert float(clearance.amin(dim=1).max()) < 1e-5
+        env.reset()
+
+
+@pytest.mark.parametrize("kind", ["stairs", "stairs_down", "slopes"])
+def test_robots_begin_along_the_flight(kind):
+    env = _env(kind, 200)
+    assert float(env.heading[:, 0].abs().min()) >= math.cos(0.25 * math.pi) - 1e-3
+    assert (env.heading[:, 0] > 0.0).float().mean() == pytest.approx(0.5, abs=0.15)
+
+
+def test_a_ball_that_drops_on_a_slope_bounces_along_its_normal():
+    level = 3
+    spec = mujoco.MjSpec()
+    model = build_scene(SceneCfg(ground_boxes=KINDS["slopes"].boxes), pictured=False)
+    simulation = BatchSimulation(model, 1)
+    ground = BoxGround(simulation, ["slopes"])
+    ground.level[:] = level
+    ground.lay(torch.tensor([[2.0, 0.0]]))
+    spec.option.timestep = 1e-4
+    for index in ground._boxes.tolist():
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=simulation.field("geom_pos")[0, index].tolist(),
+            size=simulation.field("geom_size")[0, index].tolist(),
+            quat=simulation.field("geom_quat")[0, index].tolist(),
+        )
+    ball = spec.worldbody.add_body(pos=(2.0, 0.0, 1.2))
+    ball.add_freejoint()
+    ball.add_geom(size=(0.05, 0.05, 0.05), friction=(1e-6, 0.0, 0.0), priority=1, solref=(-1e6, 0))
+    compiled = spec.compile()
+    data = mujoco.MjData(compiled)
+    before = data.qvel[:3].copy()
+    while not data.ncon:
+        before = data.qvel[:3].copy()
+        mujoco.mj_step(compiled, data)
+    while data.ncon:
+        mujoco.mj_step(compiled, data)
+    change = data.qvel[:3] - before
+    angle = math.radians((5.0, 10.0, 15.0, 20.0, 25.0)[level])
+    normal = np.array([-math.sin(angle), 0.0, math.cos(angle)])
+    np.testing.assert_allclose(change / np.linalg.norm(change), normal, atol=0.01)
+
+
+def test_each_robot_walks_on_its_own_ground_as_if_it_were_alone():
+    both = _env("rough", 6)
+    generator = torch.Generator().manual_seed(0)
+    actions = [2.0 * torch.randn(6, 12, generator=generator) for _ in range(30)]
+    for action in actions:
+        both.step(action)
+    levels = _ground(both).level.clone()
+    other = _env("rough", 6)
+    _ground(other).level[0] = (_ground(other).level[0] + 1) % 5  # of one robot alone
+    _ground(other).lay(other.simulation.qpos[:, :2], torch.ones(6, dtype=torch.bool))
+    for action in actions:
+        other.step(action)
+    assert torch.equal(both.simulation.qpos[1:], other.simulation.qpos[1:])
+    assert torch.equal(levels[1:], _ground(other).level[1:])
+
+
+@pytest.mark.parametrize("kind", ["indoor", "rough"])
+def test_a_walk_over_ground_goes_on_bit_for_bit(kind):
+    one, other = _env(kind), _env(kind)
+    generator = torch.Generator().manual_seed(0)
+    _walk(one, 40, generator)
+    other.load_state_dict(one.state_dict())
+    state = generator.get_state()
+    _walk(one, 60, generator)
+    generator.set_state(state)
+    _walk(other, 60, generator)
+    assert torch.equal(one.simulation.qpos, other.simulation.qpos)
+    assert torch.equal(_ground(one).level, _ground(other).level)
+    assert torch.equal(_ground(one).key, _ground(other).key)
+
+
+def test_heights_around_a_robot_are_those_of_its_ground():
+    env = _env("stairs", 5)
+    _ground(env).level = torch.arange(5)
+    env.simulation.qpos[:, 0] = 3.0  # on the flight
+    _ground(env).lay(env.simulation.qpos[:, :2], torch.ones(5, dtype=torch.bool))
+    env._read_state()
+    heights = env.ground.height_map(env.grid, env.base_pos, env.heading)
+    assert (heights.amax(dim=1) - heights.amin(dim=1)).diff().min() > 0.0
+
+
+@pytest.mark.parametrize("name", GROUNDS)
+def test_kinds_are_shared_out_as_the_table_says(name):
+    cfg = TerrainCfg(kind=name)
+    kinds = kind_of_robot(cfg, 1000)
+    for kind, share in cfg.shares.items():
+        assert kinds.count(kind) / 1000 == pytest.approx(share, abs=0.01)
+
+
+def test_a_kind_that_there_is_not_is_refused_with_those_that_there_are():
+    with pytest.raises(ValueError, match=r"env\.terrain\.kind must be .*indoor.*got 'moon'"):
+        TerrainCfg(kind="moon")
+    with pytest.raises(ValueError, match=r"env\.terrain\.first_levels"):
+        TerrainCfg(first_levels=(0, 5))
+    with pytest.raises(ValueError, match=r"env\.terrain\.first_levels"):
+        TerrainCfg(first_levels=(3, 1))

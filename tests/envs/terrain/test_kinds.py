@@ -1,0 +1,138 @@
+"""Heights in closed form are those of the boxes that are laid, wherever one asks."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+import torch
+
+from mute.envs.batch_simulation import BatchSimulation
+from mute.envs.scene import SceneCfg, build_scene
+from mute.envs.terrain import KINDS, BoxGround
+from mute.envs.terrain.draws import KEYS
+from mute.envs.terrain.figures import FIGURES, LEVELS, TREAD
+from mute.envs.terrain.layout import REACH
+
+_ROBOTS = 15
+_AWAY = [name for name in KINDS if name != "flat"]
+
+
+def _ground(name: str, robots: int = _ROBOTS) -> tuple[BoxGround, BatchSimulation]:
+    model = build_scene(SceneCfg(ground_boxes=KINDS[name].boxes), pictured=False)
+    simulation = BatchSimulation(model, robots)
+    ground = BoxGround(simulation, [name] * robots)
+    generator = torch.Generator().manual_seed(3)
+    ground.level = torch.arange(robots) % LEVELS
+    ground.key = torch.randint(KEYS, (robots,), generator=generator)
+    return ground, simulation
+
+
+def _model_of(simulation: BatchSimulation, robot: int) -> mujoco.MjModel:
+    """Return the model that a robot is stepped with."""
+    model = simulation.model
+    for name in ("geom_pos", "geom_size", "geom_quat"):
+        getattr(model, name)[:] = simulation.field(name)[robot].numpy()
+    return model
+
+
+def _seen_from_above(model: mujoco.MjModel, points: torch.Tensor) -> np.ndarray:
+    """Return the height at which rays from above meet the ground, m."""
+    data = mujoco.MjData(model)
+    data.qpos[2] = 50.0
+    mujoco.mj_forward(model, data)
+    down, found = np.array([0.0, 0.0, -1.0]), np.zeros(1, dtype=np.int32)
+    starts = [np.array([x, y, 10.0]) for x, y in points.tolist()]
+    return np.array(
+        [10.0 - mujoco.mj_ray(model, data, at, down, None, 1, -1, found) for at in starts]
+    )
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_heights_are_those_of_what_is_laid_within_reach(name):
+    ground, simulation = _ground(name)
+    generator = torch.Generator().manual_seed(0)
+    xy = 40.0 * (torch.rand(_ROBOTS, 2, generator=generator) - 0.5)
+    ground.lay(xy)
+    # Moved on by less than it takes to be laid anew.
+    xy = torch.floor(xy / TREAD) * TREAD + TREAD * torch.rand(_ROBOTS, 2, generator=generator)
+    ground.lay(xy)
+    around = 2.0 * REACH * (torch.rand(_ROBOTS, 60, 2, generator=generator) - 0.5)
+    points = xy[:, None] + around
+    heights = ground.height(points)
+    for robot in range(_ROBOTS):
+        seen = _seen_from_above(_model_of(simulation, robot), points[robot])
+        np.testing.assert_allclose(heights[robot].numpy(), seen, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_robots_begin_on_level_ground_at_height_zero(name):
+    ground, _ = _ground(name)
+    within = 0.45 * (2.0 * torch.rand(_ROBOTS, 100, 2) - 1.0)
+    if name == "uneven":  # which is level nowhere
+        largest = torch.tensor(FIGURES["uneven"])[ground.level]
+        assert (ground.height(within).abs().amax(dim=1) <= 0.5 * largest).all()
+    else:
+        assert float(ground.height(within).abs().max()) == 0.0
+
+
+@pytest.mark.parametrize("name", _AWAY)
+def test_a_higher_level_has_more_between_its_lowest_and_highest_place(name):
+    ground, _ = _ground(name, LEVELS)
+    ground.key = torch.full((LEVELS,), 77)
+    line = torch.linspace(-30.0, 30.0, 4001)
+    points = torch.stack((line, torch.full_like(line, 0.3)), dim=1).expand(LEVELS, -1, -1)
+    heights = ground.height(points)
+    spread = heights.amax(dim=1) - heights.amin(dim=1)
+    assert (spread.diff() > 0.0).all()
+
+
+@pytest.mark.parametrize("name", ["stairs", "stairs_down"])
+def test_stairs_have_risers_of_their_level_and_treads_of_30_centimetres(name):
+    ground, _ = _ground(name, LEVELS)
+    line = torch.arange(0.0, 9.0, 0.01) + 0.005
+    points = torch.stack((line, torch.zeros_like(line)), dim=1).expand(LEVELS, -1, -1)
+    rises = ground.height(points).diff(dim=1)
+    risers = torch.tensor(FIGURES["riser"])
+    assert (rises[:, (rises != 0.0).any(dim=0)].abs() - risers[:, None]).abs().max() < 1e-6
+    first = 1.0 if name == "stairs" else -1.0
+    places = torch.nonzero(rises[0])[:, 0]
+    assert float(rises[0, places[0]]) * first > 0.0
+    flight = places[:8].diff().float() * 0.01
+    torch.testing.assert_close(flight, torch.full((7,), TREAD), atol=0.011, rtol=0.0)
+
+
+def test_a_slope_rises_by_its_angle():
+    ground, _ = _ground("slopes", LEVELS)
+    points = torch.tensor([[1.5, 0.0], [2.5, 0.0]]).expand(LEVELS, -1, -1)
+    rise = ground.height(points).diff(dim=1)[:, 0]
+    torch.testing.assert_close(rise, torch.tan(torch.tensor(FIGURES["slope"])))
+
+
+@pytest.mark.parametrize("name", ["uneven", "blocks", "rooms"])
+def test_ground_follows_from_its_key_and_nothing_else(name):
+    ground, _ = _ground(name, 3)
+    ground.level[:] = 2
+    ground.key = torch.tensor([5, 5, 1234])
+    points = (20.0 * torch.rand(1, 500, 2, generator=torch.Generator().manual_seed(1))).expand(
+        3, -1, -1
+    )
+    one, same, other = ground.height(points)
+    assert torch.equal(one, same)
+    assert not torch.equal(one, other)
+
+
+def test_rooms_have_cables_sills_carpets_steps_and_stairs():
+    ground, _ = _ground("rooms", 1)
+    ground.level[:] = 4
+    ground.key[:] = 0
+    line = torch.arange(0.0, 128 * 2.4, 0.001)
+    points = torch.stack((line, torch.zeros_like(line)), dim=1)[None]
+    heights = ground.height(points)[0]
+    steps = heights.diff().abs()
+    risers = steps[steps > 0.0]
+    assert float(risers.max()) == pytest.approx(FIGURES["riser"][4], abs=1e-5)
+    assert float(heights.max()) == pytest.approx(3 * FIGURES["riser"][4], abs=1e-5)
+    assert float(risers.min()) < FIGURES["carpet"][4]
+    runs = torch.nonzero(steps)[:, 0].diff() * 0.001
+    assert float(runs.min()) < 0.017  # a cable is 8 to 16 mm wide
