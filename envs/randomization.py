@@ -15,7 +15,14 @@ from mute.support.ranges import Range, check_ordered, check_ranges
 
 from .simulation import Simulation
 
-__all__ = ["RandomizationCfg", "RobotPhysics", "full_randomization", "randomize_physics"]
+__all__ = [
+    "KNOWN",
+    "PHYSICS_DIM",
+    "RandomizationCfg",
+    "RobotPhysics",
+    "full_randomization",
+    "randomize_physics",
+]
 
 _TRUNK_MASS = 5.204
 """Mass of the trunk before anything is added, kg; a configuration is checked without the model."""
@@ -135,12 +142,12 @@ def randomize_physics(
 ) -> RobotPhysics:
     """Draw the physics of every simulation.
 
+    What all robots have as the model has it is not drawn, so that it changes no other draw.
+
     Args:
         simulation: The simulations; their model fields are written.
         cfg: Ranges.
         generator: Source of the draws.
-
-    What all robots have alike is not drawn, so that it changes no other draw.
     """
     num_envs, model, device = simulation.num_envs, simulation.model, simulation.device
     exact = torch.zeros(num_envs, model.nu, device=device)
@@ -174,7 +181,8 @@ def randomize_physics(
     _randomize_gains(simulation, strength, strength)
     simulation.field("actuator_forcerange")[:] *= strength[:, :, None]
     simulation.field("dof_armature")[:, 6:] *= draw_if(cfg.armature, 1.0, model.nv - 6)
-    _soften_floor(simulation, draw_if(cfg.floor_stiffness, 1.0, 1))
+    if cfg.floor_stiffness != (1.0, 1.0):
+        _soften_floor(simulation, draw(cfg.floor_stiffness, 1))
     delay = draw_if(cfg.action_delay, 0.0, 1)
     if cfg.action_delay[1] > 0.0:
         simulation.field("actuator_delay")[:] = delay
@@ -199,9 +207,9 @@ def _soften_floor(simulation: Simulation, stiffness: torch.Tensor) -> None:
     """Scale the stiffness of the floor's contacts: with a time constant goes its root's inverse."""
     model = simulation.model
     floor = np.flatnonzero(model.geom_bodyid == 0)
+    solref = simulation.field("geom_solref")
     # Below two physics steps MuJoCo would stretch the time constant without a word (refsafe).
     shortest = 2.0 * model.opt.timestep
-    solref = simulation.field("geom_solref")
     time = (solref[:, floor, 0] / stiffness.sqrt()).clamp(min=shortest)
     solref[:, floor, 0] = time.to(solref.dtype)
 

@@ -21,6 +21,7 @@ import torch
 
 from .engine_version import check_version, version_entry
 from .model_fields import load_fields, saved_fields
+from .scene import GROUND_BOX
 from .simulation import MAX_SPEED, Stage
 
 __all__ = ["WarpSimulation"]
@@ -61,8 +62,10 @@ class WarpSimulation:
             device: "cpu", "cuda" or "cuda:N".
 
         Raises:
-            ValueError: If MuJoCo Warp is not installed, or there is no such device.
+            ValueError: If MuJoCo Warp is not installed, there is no such device, or the model has
+                what this engine has not: ground laid anew, or motors that are late.
         """
+        _check_model(model)
         self._warp, self._engine = _load_packages()
         self.model = model
         self.num_envs = num_envs
@@ -243,6 +246,22 @@ class WarpSimulation:
     def _view(self, array: Any) -> torch.Tensor:  # noqa: ANN401
         """Return a tensor that shares an array's memory."""
         return self._warp.to_torch(array)
+
+
+def _check_model(model: mujoco.MjModel) -> None:
+    """Refuse what is not done here: boxes' bounds and past set points have forms of Warp's own.
+
+    Raises:
+        ValueError: If the model has some of it.
+    """
+    boxes = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, GROUND_BOX.format(0)) >= 0
+    for there, field in ((boxes, "terrain.kind"), (model.nhistory, "randomization.action_delay")):
+        if there:
+            raise ValueError(
+                f"the engine 'warp' has flat ground and motors that are never late alone: let the"
+                f" physics run on the CPU with env.engine 'mujoco', or leave env.{field} as it is"
+                " by default"
+            )
 
 
 def _load_packages() -> tuple[Any, Any]:

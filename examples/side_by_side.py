@@ -169,7 +169,7 @@ class _Camera(contextlib.AbstractContextManager["_Camera"]):
 
     def picture(self) -> np.ndarray:
         """Return the robot as it stands now. Shape: (height, width, 3), uint8."""
-        self._picture.show(self._env.simulation.qpos[0])
+        self._picture.show(0)
         data = self._picture.data
         self._view.lookat[:] = (*data.qpos[:2], _LOOK_AT_HEIGHT)
         self._renderer.update_scene(data, self._view)

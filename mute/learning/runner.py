@@ -24,7 +24,13 @@ from mute.learning.estimated_env import EstimatedEnv, make_estimator
 from mute.learning.estimator_trainer import EstimatorTrainer
 from mute.learning.logger import TrainingLogger, quiet_writer_thread
 from mute.learning.resumption import check_resumption
-from mute.learning.saved_state import check_learner, check_own_state, check_totals, entry
+from mute.learning.saved_state import (
+    check_known_physics,
+    check_learner,
+    check_own_state,
+    check_totals,
+    entry,
+)
 from mute.learning.settling import Settling
 from mute.learning.symmetry import groups, tie_actor_critic, tie_estimator
 from mute.support.signals import StopRequest
@@ -228,6 +234,7 @@ class MuteRunner(OnPolicyRunner):
             saved_cfg = from_plain(checkpoint["config"])
             own = _part_of_rank(checkpoint, self.ranks)
             check_resumption(saved_cfg, self.task_cfg, robots_anew=own is None)
+            check_known_physics(checkpoint)
             check_learner(checkpoint, self.alg)
             if own is None:
                 check_totals(checkpoint)

@@ -14,6 +14,7 @@ import torch
 from torch import Tensor, nn
 from torch.optim import Optimizer
 
+from mute.envs.randomization import PHYSICS_DIM
 from mute.envs.scene import LEGS
 from mute.learning.algorithm import EstimatorPPO
 from mute.networks.estimator import Estimator
@@ -21,6 +22,7 @@ from mute.networks.estimator import Estimator
 __all__ = [
     "check_form",
     "check_iteration",
+    "check_known_physics",
     "check_learner",
     "check_own_state",
     "check_totals",
@@ -122,6 +124,24 @@ def check_learner(checkpoint: Mapping[str, Any], alg: EstimatorPPO) -> None:
     _check_optimizer(entry(trainer, "optimizer", place), own, f"{place}.optimizer")
     place = "optimizer_state_dict"
     _check_optimizer(entry(checkpoint, place), alg.optimizer, place)
+
+
+def check_known_physics(checkpoint: Mapping[str, Any]) -> None:
+    """Check that the critic of a training was told as much of each robot as it is here.
+
+    What is not there is left to the other checks.
+
+    Raises:
+        ValueError: If it was told less, by an earlier version, or more.
+    """
+    part: object = checkpoint
+    for key in ("env", "env", "physics"):
+        part = part.get(key) if isinstance(part, Mapping) else None
+    if isinstance(part, Tensor) and part.ndim == 2 and part.shape[1] != PHYSICS_DIM:
+        raise ValueError(
+            f"its critic knows {part.shape[1]} figures of a robot's physics, and here it would"
+            f" {PHYSICS_DIM}; a training of that version can be played and exported alone"
+        )
 
 
 def check_own_state(saved: Mapping[str, Any], own: Mapping[str, Any], alg: EstimatorPPO) -> None:

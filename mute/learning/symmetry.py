@@ -56,8 +56,8 @@ _PARTS = {
     "command": Reflection((0, 1, 2, 3), (1.0, -1.0, -1.0, 1.0)),
     "contact": FEET,
     "phase": FEET,
-    # Friction, added mass, offset of the centre of mass.
-    "physics": Reflection.joined([Reflection.unchanged(2), POLAR]),
+    # Friction, added mass, offset of the centre of mass, motor strength, delay.
+    "physics": Reflection.joined([Reflection.unchanged(2), POLAR, Reflection.unchanged(2)]),
 }
 
 OBSERVATION = Reflection.joined([_PARTS[name] for name in OBSERVATION_WIDTHS])

@@ -81,7 +81,7 @@ def test_the_same_seed_gives_the_same_episode_in_the_same_and_in_another_environ
 
 def test_another_seed_gives_another_robot():
     env = _make_env()
-    physics = [env.reset(seed=seed)[1]["privileged"][-5:] for seed in (1, 2)]
+    physics = [env.reset(seed=seed)[1]["privileged"][-7:-2] for seed in (1, 2)]
     assert (physics[0] != physics[1]).all()
 
 
@@ -251,7 +251,7 @@ def test_a_batch_returns_arrays_with_an_axis_of_robots_in_float32():
     assert observations.dtype == rewards.dtype == np.float32
     assert rewards.shape == terminated.shape == truncated.shape == (3,)
     assert terminated.dtype == truncated.dtype == np.bool_
-    assert infos["privileged"].shape == (3, 51)
+    assert infos["privileged"].shape == (3, 53)
     assert infos["_privileged"].all()
     assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,7 +20,8 @@ def _placed(**given: Any) -> Any:
         qpos=torch.full((2, 19), 9.0), qvel=torch.full((2, 18), 9.0), ctrl=torch.full((2, 12), 9.0)
     )
     cfg = QuadrupedEnvCfg(initial_joint_noise=0.1, initial_velocity=0.2, **given)
-    place(engine, torch.tensor([True, False]), torch.full((2, NUM_DRAWS), 0.5), STAND, cfg)
+    mask, heading = torch.tensor([True, False]), torch.full((2,), 0.5 * math.pi)
+    place(engine, mask, torch.full((2, NUM_DRAWS), 0.5), heading, STAND, cfg)
     return engine
 
 
@@ -30,7 +32,7 @@ def test_joints_and_velocities_lie_off_the_stance_by_their_share_of_the_draw():
     assert engine.ctrl[0].tolist() == STAND.tolist()
 
 
-def test_half_of_the_draw_turns_the_robot_by_a_right_angle():
+def test_a_robot_is_turned_to_the_heading_that_it_is_given():
     engine = _placed()
     half = 0.5**0.5  # cos and sin of half the angle, pi / 4
     assert engine.qpos[0, 3:7].tolist() == pytest.approx([half, 0.0, 0.0, half])

@@ -85,7 +85,7 @@ def test_a_step_returns_the_groups_and_shapes_of_a_vec_env():
     env = _make_env(3)
     observations, rewards, dones, extras = _stand_still(env)
     assert observations["policy"].shape == (3, 46)
-    assert observations["privileged"].shape == (3, 3 + 35 + 4 + 4 + 5)
+    assert observations["privileged"].shape == (3, 3 + 35 + 4 + 4 + 7)
     assert rewards.shape == dones.shape == extras["time_outs"].shape == (3,)
     assert dones.dtype == extras["time_outs"].dtype == torch.bool
     assert env.max_episode_length == 1000
@@ -148,6 +148,62 @@ def test_an_action_is_an_offset_to_the_stance():
     env.step(torch.full((2, 12), 0.2))
     expected = torch.tensor(STAND_JOINT_POS) + 0.1
     torch.testing.assert_close(env.simulation.ctrl, expected.expand(2, 12))
+
+
+def _alike_but(**ranges):
+    """Return robots that differ in the given ranges alone."""
+    nothing = {"friction_factor": (1, 1), "added_mass": (0, 0), "com_offset": (0, 0)}
+    nothing |= {"gain_scale": (1, 1), "friction_loss": (0, 0)}
+    return CALM | {"randomization": RandomizationCfg(**nothing, **ranges, push_interval=0.0)}
+
+
+def test_an_encoders_offset_is_in_what_the_policy_sees_and_in_what_the_motor_holds():
+    env = _make_env(3, **_alike_but(encoder_offset=(-0.1, 0.1)))
+    offset = env.encoder_offset
+    assert offset.unique().numel() == 36
+    observed = _repeat(env, 0.4, 3)[0]["policy"][:, POLICY["joint_pos"]]
+    scale = env.cfg.observations.scales.get("joint_pos", 1.0)
+    torch.testing.assert_close(observed, scale * (env.joint_pos + offset))
+    # By its encoder a joint is where it is asked to be when it stands this much beside it.
+    set_point = env.stand + 0.4 * env.cfg.action_scale - offset
+    torch.testing.assert_close(env.simulation.ctrl, set_point)
+
+
+def test_a_tilted_sensor_sees_gravity_and_turning_from_its_own_frame():
+    tilt = 0.2
+    env = _make_env(3, **_alike_but(imu_tilt=(tilt, tilt)))
+    env.simulation.qvel[:, 3:6] = torch.tensor([0.5, -1.0, 2.0])
+    env._read_state()
+    env._observe()
+    seen = env.get_observations()["policy"]
+    scales = env.cfg.observations.scales
+    # Turned by the vector r = (tilt, tilt, tilt), by Rodrigues' formula.
+    axis, angle = torch.full((3,), 3**-0.5), 3**0.5 * tilt
+    for name, true in (
+        ("base_ang_vel", env.base_ang_vel),
+        ("projected_gravity", env.projected_gravity),
+    ):
+        along = (true @ axis)[:, None] * axis
+        turned = math.cos(angle) * true + (1.0 - math.cos(angle)) * along
+        turned += math.sin(angle) * torch.linalg.cross(axis.expand_as(true), true)
+        torch.testing.assert_close(seen[:, POLICY[name]], scales.get(name, 1.0) * turned)
+    # What is rewarded, and what the critic is told, is what the robot does.
+    torch.testing.assert_close(env.projected_gravity, torch.tensor([[0.0, 0.0, -1.0]]).expand(3, 3))
+
+
+def test_an_action_of_a_late_robot_comes_a_control_step_later():
+    env, prompt = (_make_env(2, **_alike_but(action_delay=(delay, delay))) for delay in (0.02, 0.0))
+    first, second = (
+        [
+            (each.step(torch.full((2, 12), size)), each.simulation.actuator_force.clone())[1]
+            for size in (0.0, 1.0, 1.0)
+        ]
+        for each in (env, prompt)
+    )
+    torch.testing.assert_close(first[0], second[0])
+    torch.testing.assert_close(first[1], second[0], atol=1.0, rtol=0.0)
+    assert ((second[1] - second[0]).abs().amax(dim=1) > 3.0).all()
+    assert ((first[2] - first[1]).abs().amax(dim=1) > 3.0).all()
 
 
 def test_noise_reaches_the_policy_and_stays_within_its_amplitude():

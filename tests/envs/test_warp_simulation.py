@@ -53,6 +53,19 @@ def test_without_the_package_one_line_says_what_to_install(monkeypatch):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("scene", "field"),
+    [
+        ({"ground_boxes": 1}, "env.terrain.kind"),
+        ({"longest_delay": 0.02}, "env.randomization.action_delay"),
+    ],
+)
+def test_ground_of_boxes_and_late_motors_are_refused_with_the_field_and_a_way_out(scene, field):
+    with pytest.raises(ValueError, match=rf"env\.engine 'mujoco', or leave {field}") as error:
+        WarpSimulation(build_scene(SceneCfg(**scene)), 1)
+    assert "\n" not in str(error.value)
+
+
 @pytest.mark.parametrize("engines", [("mujoco", "warp"), ("warp", "mujoco")])
 def test_a_state_of_the_other_engine_is_refused(engines):
     one, other = (make_simulation(MODEL, 1, engine=engine) for engine in engines)
@@ -162,7 +175,7 @@ def test_both_engines_draw_the_same_physics():
     engines = [make_simulation(MODEL, 4, engine=engine) for engine in ("mujoco", "warp")]
     generators = [torch.Generator().manual_seed(5) for _ in engines]
     known = [
-        randomize_physics(simulation, RandomizationCfg(), generator)
+        randomize_physics(simulation, RandomizationCfg(), generator).known
         for simulation, generator in zip(engines, generators, strict=True)
     ]
     assert torch.equal(*known)

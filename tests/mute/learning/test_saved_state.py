@@ -194,3 +194,16 @@ def test_an_empty_path_of_a_run_that_has_just_begun_loads(tmp_path: Path):
     content = load_checkpoint(tmp_path / "model_0.pt")
     assert content["estimator_trainer"]["optimizer"]["state"] == {}
     make_runner(iterations=9).load(str(tmp_path / "model_0.pt"))
+
+
+def test_a_training_whose_critic_knew_less_of_its_robots_is_refused_in_plain_words(
+    saved, fresh, monkeypatch
+):
+    physics = saved["env"]["env"]["physics"][:, :5]
+    weight = saved["critic_state_dict"]["mlp.0.weight"][:, :-2]
+    earlier = _replaced(saved, ("env", "env", "physics"), physics)
+    earlier = _replaced(earlier, ("critic_state_dict", "mlp.0.weight"), weight)
+    assert (
+        "its critic knows 5 figures of a robot's physics, and here it would 7; a training of"
+        in (_refusal(fresh, earlier, monkeypatch))
+    )

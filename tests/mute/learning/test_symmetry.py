@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import pytest
 import torch
@@ -15,7 +16,8 @@ from mute.envs.height_map import HeightMapCfg
 from mute.envs.observations import OBS_DIM, ObservationsCfg
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
-from mute.envs.randomization import RandomizationCfg
+from mute.envs.randomization import RandomizationCfg, full_randomization
+from mute.envs.terrain import TerrainCfg
 from mute.learning.estimated_env import estimate_group, go_group
 from mute.learning.runner import MuteRunner
 from mute.learning.symmetry import FEET, JOINTS, OBSERVATION, POLAR, groups, heights
@@ -88,12 +90,27 @@ def test_a_height_is_mirrored_to_the_point_on_the_other_side(cfg):
 
 
 def test_the_critics_physics_are_mirrored_by_the_side_of_the_centre_of_mass():
-    env = QuadrupedEnv(QuadrupedEnvCfg(num_envs=3))
+    wide = full_randomization()
+    env = QuadrupedEnv(QuadrupedEnvCfg(num_envs=3, randomization=wide))
     physics = groups(env, latent_dim=2, with_phase=True)["privileged"](
         env.get_observations()["privileged"]
     )[:, env.privileged_slices["physics"]]
-    # Friction, added mass, and where the centre of mass lies along x, y, z.
-    torch.testing.assert_close(physics, env.physics * torch.tensor([1.0, 1.0, 1.0, -1.0, 1.0]))
+    # Friction, added mass, where the centre of mass lies along x, y, z, strength and delay.
+    signs = torch.tensor([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
+    torch.testing.assert_close(physics, env.physics * signs)
+    assert (env.physics != 0.0).all()
+
+
+def test_a_robot_on_mirrored_ground_has_the_mirrored_height_map():
+    calm = {"randomization": RandomizationCfg(enabled=False), "initial_velocity": 0.0}
+    terrain = TerrainCfg(kind="slopes", first_levels=(3, 3))
+    env = QuadrupedEnv(QuadrupedEnvCfg(num_envs=2, terrain=terrain, **calm))
+    # Slopes are alike on both sides of the x axis: so are the robots put, and what is below them.
+    place = torch.tensor([[1.2, 0.3, 0.5], [1.2, -0.3, 0.5]])
+    heading = torch.tensor([[math.cos(0.6), math.sin(0.6)], [math.cos(0.6), -math.sin(0.6)]])
+    robot, image = env.ground.height_map(env.grid, place, heading)
+    torch.testing.assert_close(heights(env.grid)(robot), image)
+    assert (robot - image).abs().max() > 0.05
 
 
 def test_a_centre_of_mass_that_lies_more_on_one_side_is_refused():

@@ -1,4 +1,4 @@
-"""Tests of the ground and of the height map."""
+"""The grid of the height map, its scale, and how it turns with the robot."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import math
 import pytest
 import torch
 
-from mute.envs.terrain import FlatTerrain, HeightMapCfg, Terrain
+from mute.envs.height_map import HeightMapCfg
+from mute.envs.terrain import FlatGround, Ground
 
 
-class _Slope(Terrain):
+class _Slope(Ground):
     """Ground as high as the world's x, plus a hundred times its y."""
 
     def height(self, points):
@@ -93,15 +94,15 @@ def test_a_grid_without_extent_is_the_point_under_the_trunk():
 
 def test_flat_ground_is_at_zero_everywhere():
     points = torch.tensor([[[3.0, -4.0], [0.0, 0.0]]])
-    assert torch.equal(FlatTerrain().height(points), torch.zeros(1, 2))
+    assert torch.equal(FlatGround().height(points), torch.zeros(1, 2))
 
 
 def test_over_flat_ground_every_height_is_the_trunks_wherever_the_grid_lies():
     base_pos = torch.tensor([[5.0, 1.0, 0.31], [0.0, 0.0, 0.2]])
     where = HeightMapCfg().grid(), base_pos, _heading(0.3, 2.0)
-    heights = FlatTerrain().height_map(*where)
+    heights = FlatGround().height_map(*where)
     assert torch.equal(heights, torch.tensor([[0.31], [0.2]]).expand(2, 35))
-    assert torch.equal(heights, Terrain.height_map(FlatTerrain(), *where))
+    assert torch.equal(heights, Ground.height_map(FlatGround(), *where))
 
 
 @pytest.mark.parametrize(
