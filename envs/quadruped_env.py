@@ -472,11 +472,12 @@ class QuadrupedEnv(VecEnv):
 
 def scene_of(cfg: QuadrupedEnvCfg) -> SceneCfg:
     """Return a task's scene, with the boxes that its ground takes and the delays of its motors."""
-    robots = cfg.randomization
+    scene, robots = cfg.scene, cfg.randomization
+    longest_delay = robots.action_delay[1] if robots.enabled else 0.0
     return dataclasses.replace(
-        cfg.scene,
-        ground_boxes=num_boxes(tuple(cfg.terrain.shares)),
-        longest_delay=robots.action_delay[1] if robots.enabled else 0.0,
+        scene,
+        ground_boxes=max(scene.ground_boxes, num_boxes(cfg.terrain.shares)),
+        longest_delay=max(scene.longest_delay, longest_delay),
     )
 
 

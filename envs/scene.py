@@ -143,11 +143,12 @@ class SceneCfg:
     """Floors side by side, level with each other; none leaves one endless floor."""
 
     ground_boxes: int = 0
-    """Boxes for ground of its own under each robot, see `envs.terrain`; the floor is what they
-    stand on."""
+    """Boxes for ground of its own under each robot, which stand on the floor; as many as the kind
+    of ground takes (`envs.terrain`), unless there are to be more."""
 
     longest_delay: float = 0.0
-    """Longest time from an action to its set points that a motor can have, s."""
+    """Longest time from an action to its set points that a motor can have, s; as long as the
+    randomisation may draw, unless it is to be longer."""
 
     foot_forces: bool = False
     """Whether to measure what sound needs and walking does not: contact forces and turning rates

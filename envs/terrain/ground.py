@@ -170,5 +170,6 @@ class BoxGround(Ground):
         self._size[at] = half
         self._aabb[(*at, slice(3, None))] = half
         self._rbound[at] = half.norm(dim=-1)
-        self._quat[(*at, 0)] = torch.cos(0.5 * laid.pitch).to(dtype)
-        self._quat[(*at, 2)] = torch.sin(0.5 * laid.pitch).to(dtype)
+        turn = 0.5 * laid.pitch.to(dtype)  # before, or MuJoCo would have no unit quaternions
+        self._quat[(*at, 0)] = torch.cos(turn)
+        self._quat[(*at, 2)] = torch.sin(turn)

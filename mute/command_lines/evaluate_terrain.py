@@ -12,11 +12,12 @@ from typing import Any
 import torch
 
 from mute.command_lines.arguments import (
+    LONGEST_WALK,
+    MANY_ROBOTS,
     Words,
     check_distinct,
     check_option,
     check_seed,
-    check_trials,
     make_directory,
 )
 from mute.command_lines.policy_options import PolicyArgs
@@ -123,7 +124,8 @@ def _report(args: TerrainArgs, about: dict[str, Any], rows: list[dict[str, Any]]
 
 
 def _check(args: TerrainArgs) -> None:
-    check_trials(args.episodes, args.seconds)
+    check_option("episodes", args.episodes, MANY_ROBOTS)
+    check_option("seconds", args.seconds, Range(1.0, LONGEST_WALK, above=True))
     check_seed(args.seed)
     check_distinct("kinds", args.kinds)
     check_distinct("levels", args.levels)

@@ -18,6 +18,7 @@ from mute.envs.scene import FOOT_RADIUS
 from mute.envs.terrain import TerrainCfg
 from mute.evaluation.estimation_errors import EstimationMeter
 from mute.evaluation.trials import evaluation_cfg, run_trial
+from mute.evaluation.usual_robots import under_conditions
 
 __all__ = ["Crossing", "HeightBaselines", "cross", "crossing_cfg"]
 
@@ -36,11 +37,12 @@ class Crossing:
     episodes: int
     """Robots, one episode each."""
     success: float
-    """Share of them that did not fall and got more than 80 % of the commanded distance."""
+    """Share of them that did not fall and got more than 80 % of the commanded distance; one whose
+    simulation turned unstable is not among them, and did not fall."""
     falls: float
     """Share that fell."""
     made: float
-    """Distance along the command over the commanded one, mean."""
+    """Distance along the command over the commanded one, until a fall, mean."""
     velocity_rmse: float
     """Estimator: root of the mean squared error of the velocity over axes, m/s."""
     height_rmse: float
@@ -111,7 +113,7 @@ def crossing_cfg(
     """
     terrain = TerrainCfg(kind=kind, first_levels=(level, level), curriculum=False)
     robots = full_randomization(push_interval=0.0)
-    env = dataclasses.replace(policy.cfg.env, randomization=robots)
+    env = dataclasses.replace(under_conditions(policy).cfg.env, randomization=robots)
     return evaluation_cfg(env, episodes, seconds, seed, randomized=True, terrain=terrain)
 
 
@@ -138,13 +140,15 @@ def cross(
     estimation, baselines = EstimationMeter(env, controller), HeightBaselines(env)
     made = torch.zeros(cfg.num_envs)
     fallen = torch.zeros(cfg.num_envs, dtype=torch.bool)
+    ended = fallen.clone()
 
     def watch(observations: TensorDict, dones: torch.Tensor) -> None:
         estimation(observations, dones)
         baselines.update()
         fallen.logical_or_(env.fallen)
-        # Of who has just begun anew, nothing more counts: it fell.
-        made.add_(torch.where(dones, 0.0, env.step_dt * env.base_lin_vel[:, 0]))
+        # Who has ended before the time begins anew, of which nothing counts.
+        ended.logical_or_(dones)
+        made.add_(torch.where(ended, 0.0, env.step_dt * env.base_lin_vel[:, 0]))
         on_step()
 
     command = torch.tensor((speed, 0.0, 0.0, beta))
@@ -156,7 +160,7 @@ def cross(
         kind=cfg.terrain.kind,
         level=cfg.terrain.first_levels[0],
         episodes=cfg.num_envs,
-        success=float((~fallen & (share > _ENOUGH)).double().mean()),
+        success=float((~ended & (share > _ENOUGH)).double().mean()),
         falls=float(fallen.double().mean()),
         made=float(share.mean()),
         velocity_rmse=errors.velocity_rmse,

@@ -39,7 +39,6 @@ RULES: dict[str, Rule] = {
     "env.scene.iterations": "applied",
     "env.scene.ls_iterations": "applied",
     "env.scene.floor_solref": "applied",
-    "env.scene.longest_delay": "kept",  # which the delays of the robots decide
     "env.terrain.kind": "robots",
     "env.terrain.first_levels": "robots",  # which robots start with
     "env.terrain": "applied",

@@ -9,7 +9,8 @@ import pytest
 import torch
 
 from mute.envs.curriculum import Curriculum
-from mute.envs.step_log import curriculum_log, episode_log, gait_log
+from mute.envs.step_log import curriculum_log, episode_log, gait_log, ground_log
+from mute.envs.terrain import BoxGround, FlatGround
 
 
 def _make_footfalls(touchdown) -> Any:
@@ -82,3 +83,13 @@ def test_every_factor_of_the_curriculum_is_told():
         "Curriculum/guide": 0.75,
         "Curriculum/commands": 1.0,
     }
+
+
+def test_the_mean_level_of_each_kind_of_ground_but_the_flat_one_is_logged():
+    ground: Any = BoxGround.__new__(BoxGround)
+    ground.kinds = ("flat", "rooms", "stairs")
+    ground.kind = torch.tensor([0, 1, 2, 1])
+    ground.level = torch.tensor([4, 1, 3, 2])
+    levels = {name: float(value) for name, value in ground_log(ground).items()}
+    assert levels == {"Ground/level_rooms": 1.5, "Ground/level_stairs": 3.0}
+    assert ground_log(FlatGround()) == {}

@@ -28,6 +28,7 @@ from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
 from mute.controllers.command import Command
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.terrain import BoxGround, Ground
 from mute.evaluation.session import Session
 from mute.evaluation.trials import evaluation_cfg
 from mute.learning.runner import MuteRunner, policy_part
@@ -130,6 +131,24 @@ def test_a_level_is_said_to_be_of_the_floor_walked_on_and_of_the_first_of_severa
     assert re.search(r"level \d\d\.\d dBA \(first robot\)", run.stdout)
 
 
+def test_a_robot_is_put_on_ground_of_the_kind_and_level_that_is_asked_for(policy, monkeypatch):
+    grounds: list[Ground] = []
+    step = Session.step
+
+    def noted(session: Session) -> None:
+        grounds.append(session.env.ground)
+        step(session)
+
+    monkeypatch.setattr(Session, "step", noted)
+    words = ("--terrain", "stairs", "--level", "3", "--num-envs", "2", "--seconds", "1", "--json")
+    run = _play_here("--policy", str(policy), "--viewer", "none", *words)
+    assert run.returncode == 0, run.stderr
+    assert set(json.loads(run.stdout)) == REPORTED
+    ground = grounds[-1]
+    assert isinstance(ground, BoxGround)
+    assert (ground.kinds, ground.level.tolist()) == (("stairs",), [3, 3])
+
+
 def test_a_surface_adds_its_name_and_levels_above_the_fans_to_the_object(heard):
     printed, _ = heard
     assert set(printed) == REPORTED | {"surface", "mnl", "pnl", "laeq"}
@@ -167,6 +186,9 @@ def test_a_bad_beta_is_one_line_and_status_2():
         (("--num-envs", "-3"), "--num-envs must be an integer >= 1 .* got -3"),
         (("--seed", "-1"), "--seed must be an integer >= 0 .* got -1"),
         (("--task", "go2"), "--task must be one of go1_mute, .* got 'go2'"),
+        (("--terrain", "moon"), "--terrain must be one of flat, slopes, .* got 'moon'"),
+        (("--terrain", "indoor"), "--terrain must be one of .* got 'indoor'"),
+        (("--level", "5"), "--level must be an integer >= 0 and <= 4, got 5"),
         (("--surface", "ice"), "--surface must be one of wood, parquet, .* got 'ice'"),
         (("--wav", "walk.mp3"), "--wav must name a .wav file, got 'walk.mp3'"),
         (("--sources", "fan,voice"), "--sources must be of impacts, body, drive, scuffing, fan"),
