@@ -1,0 +1,98 @@
+"""`evaluate.py terrain` measures the kinds and levels that it is asked for, and keeps the figures."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+from learning_helpers import make_runner
+
+from mute.checkpoint import save_checkpoint
+from mute.command_lines import evaluate, evaluate_terrain
+from mute.config import to_plain
+from mute.evaluation.crossing import Crossing
+from mute.evaluation.tables import read_json
+from mute.learning.runner import policy_part
+from mute.support.errors import MuteError
+
+
+@pytest.fixture(scope="module")
+def policy_path(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("policy") / "policy.pt"
+    runner = make_runner()
+    checkpoint = runner.alg.save() | {"task": "go1_mute", "iter": 0}
+    save_checkpoint(path, policy_part(checkpoint | {"config": to_plain(runner.task_cfg)}))
+    return path
+
+
+def _words(policy_path: Path, out: Path, *more: str) -> list[str]:
+    words = ["terrain", "--policy", str(policy_path), "--episodes", "2", "--seconds", "1.1"]
+    return [*words, "--out", str(out), *more]
+
+
+def test_each_kind_and_level_is_a_row_and_flat_ground_but_one(policy_path, tmp_path, capsys):
+    words = _words(policy_path, tmp_path, "--kinds", "flat,stairs", "--levels", "1", "4", "--json")
+    assert evaluate.main(words) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == read_json(tmp_path / "terrain.json")
+    rows = printed["crossings"]
+    assert [(row["kind"], row["level"]) for row in rows] == [
+        ("flat", 1),
+        ("stairs", 1),
+        ("stairs", 4),
+    ]
+    for row in rows:
+        assert row["episodes"] == 2
+        assert 0.0 <= row["success"] <= 1.0
+        assert 0.0 <= row["falls"] <= 1.0
+        assert all(row[name] > 0.0 for name in ("velocity_rmse", "height_rmse", "height_rmse_mean"))
+    assert {"policy_sha256", "trained_seed", "commit", "machine", "speed", "beta"} <= printed.keys()
+    lines = (tmp_path / "terrain.csv").read_text().splitlines()
+    assert len(lines) == 4
+    assert lines[0].split(",") == list(rows[0])
+
+
+def _made_up(kind: str, level: int) -> Crossing:
+    return Crossing(kind, level, 2, 1.0, 0.0, 0.9, 0.1, 0.02, 0.01, 0.01, math.nan)
+
+
+def test_what_an_interrupt_leaves_whole_is_written(policy_path, tmp_path, monkeypatch, capsys):
+    measured = []
+
+    def cross(policy, cfg, *_):
+        if measured:
+            raise KeyboardInterrupt
+        measured.append(_made_up(cfg.terrain.kind, cfg.terrain.first_levels[0]))
+        return measured[0]
+
+    monkeypatch.setattr(evaluate_terrain, "cross", cross)
+    assert evaluate.main(_words(policy_path, tmp_path, "--kinds", "stairs")) == 130
+    captured = capsys.readouterr()
+    assert "interrupted; measured: 1 of 5" in captured.err
+    assert "2 episodes of 1.1 s" in captured.out
+    (row,) = read_json(tmp_path / "terrain.json")["crossings"]
+    assert (row["kind"], row["level"], row["phase_mae"]) == ("stairs", 0, None)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--kinds", "stairs,moon"], "--kinds must be of flat, slopes, .* got 'moon'"),
+        (["--kinds", "rooms,rooms"], "--kinds must name each but once, got rooms again"),
+        (["--kinds"], "--kinds must name at least one"),
+        (["--levels", "5"], "--levels must be an integer >= 0 and <= 4, got 5"),
+        (["--levels", "2", "2"], "--levels must name each but once"),
+        (["--episodes", "0"], "--episodes must be an integer >= 1 .* got 0"),
+        (["--seconds", "1"], "--seconds must be > 1 .* got 1"),
+        (["--speed", "0"], "--speed must be > 0 .* got 0"),
+        (["--beta", "1.5"], "--beta must be .* got 1.5"),
+        (["--seed", "-1"], "--seed must be .* got -1"),
+        (["--policy", "missing.pt"], r"missing\.pt"),
+    ],
+)
+def test_a_bad_argument_is_told_by_name(words, message, tmp_path):
+    with pytest.raises(MuteError, match=message):
+        evaluate.main(["terrain", "--out", str(tmp_path), *words])
+    assert list(tmp_path.iterdir()) == []
