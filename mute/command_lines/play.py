@@ -97,7 +97,7 @@ class PlayArgs(PolicyArgs):
     it), with the command half a second later; moving, near the stance with a little speed in any
     direction, as in training."""
     terrain: str = "flat"
-    """Ground to walk on: flat, slopes, uneven, blocks, stairs, stairs_down or rooms. But on flat
+    """Ground to walk on: flat, slopes, uneven, blocks, stairs, stairs_down or rooms. Except on flat
     ground, pictures have dots: green where it is, orange where the policy takes it to be."""
     level: int = 2
     """How difficult it is, 0 to 4."""

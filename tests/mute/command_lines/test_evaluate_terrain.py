@@ -1,4 +1,4 @@
-"""`evaluate.py terrain` measures the kinds and levels that it is asked for, and keeps the figures."""
+"""`evaluate.py terrain` measures what kinds and levels it is asked for, and keeps the figures."""
 
 from __future__ import annotations
 
