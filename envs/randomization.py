@@ -76,8 +76,9 @@ class RandomizationCfg:
 def full_randomization(push_interval: float = 4.0) -> RandomizationCfg:
     """Return robots that differ in everything: what a policy has to bear that leaves simulation.
 
-    Ranges are as wide as in DreamWaQ's training or wider: payload -1 to 3 kg, set points up to
-    20 ms late, friction from that of a wet floor on.
+    Payload and delays reach further than in DreamWaQ's training (arXiv 2301.10602: -1 to 2 kg, up
+    to 15 ms), motors and gains as far, the centre of mass (50 mm there) and low friction (0.2 to
+    1.25) less far.
 
     Args:
         push_interval: Time between pushes, s; 0 for none.
