@@ -23,6 +23,7 @@ _COMMANDS = {
     "evaluate sweep-speed": ("evaluate_noise", "SweepSpeedArgs"),
     "evaluate sweep-beta": ("evaluate_noise", "SweepBetaArgs"),
     "evaluate walk": ("evaluate_walk", "WalkArgs"),
+    "evaluate terrain": ("evaluate_terrain", "TerrainArgs"),
     "evaluate reliability": ("evaluate_reliability", "ReliabilityArgs"),
     "benchmark": ("benchmark", "BenchmarkArgs"),
     "meter": ("meter", "MeterArgs"),
@@ -120,6 +121,6 @@ def test_every_command_is_walked():
 
 def test_the_commands_have_as_many_options_with_numbers_as_they_seem_to():
     counts = {command: len(list(_numbers(command))) for command in _COMMANDS}
-    assert counts["play"] == 7
+    assert counts["play"] == 8
     assert counts["evaluate sweep-speed"] == 5
     assert counts["benchmark"] == 7
