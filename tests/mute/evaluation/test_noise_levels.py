@@ -45,8 +45,8 @@ def test_the_same_seed_gives_the_same_table(rows):
 def test_robots_differ_unless_they_are_twins_of_the_exact_model(rows):
     exact = _measure(seed=1, nominal=True)
     assert [row.robots for row in (*rows, *exact)] == ["different"] * 2 + ["nominal"] * 2
-    for usual, twin in zip(rows, exact, strict=True):
-        assert twin.mnl_std < usual.mnl_std
+    # Of five walks a spread is known to a third of itself.
+    assert sum(row.mnl_std**2 for row in exact) < sum(row.mnl_std**2 for row in rows)
 
 
 def test_a_policy_compared_with_itself_differs_by_less_than_its_confidence_interval(rows):
