@@ -65,6 +65,38 @@ def hindsight_phase(
     Raises:
         ValueError: If a shape, a type or `min_steps` is not as above.
     """
+    contact, begin, end, closed = _segments(contacts, starts, min_steps, max_steps)
+    progress = (_time_like(contacts) - begin) / (end - begin)
+    phase = torch.where(contact, 1.0 - progress, progress)
+    return phase.masked_fill_(~closed, 0.0), closed
+
+
+def hindsight_swing(
+    contacts: Tensor, starts: Tensor, min_steps: int = 2, max_steps: int = 50
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Tell for every sample of a recorded window how long each foot still swings.
+
+    Args:
+        contacts: As for `hindsight_phase`.
+        starts: As for `hindsight_phase`.
+        min_steps: As for `hindsight_phase`.
+        max_steps: As for `hindsight_phase`.
+
+    Returns:
+        Samples until the foot lands, and those of its whole swing, both of no meaning where it is
+        not in a closed swing, and the mask of where it is. Shapes: (T, N, F), int32, int32, bool.
+
+    Raises:
+        ValueError: If a shape, a type or `min_steps` is not as above.
+    """
+    contact, begin, end, closed = _segments(contacts, starts, min_steps, max_steps)
+    return end - _time_like(contacts), end - begin, closed & ~contact
+
+
+def _segments(
+    contacts: Tensor, starts: Tensor, min_steps: int, max_steps: int
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Return the debounced contacts, where each sample's segment begins and ends, and is closed."""
     _check_window(contacts, starts, min_steps)
     held = _held(contacts, starts, min_steps)
     source = _last_index(_or_first(held, starts)).long()
@@ -81,10 +113,7 @@ def hindsight_phase(
     begin, end = _last_index(boundary), _next_index(boundary)
     length = end - begin
     known = event.gather(0, begin.long()) & event.gather(0, end.long())
-    closed = known & (length > 0) & (length <= max_steps)
-    progress = (_time_like(contacts) - begin) / length
-    phase = torch.where(contact, 1.0 - progress, progress)
-    return phase.masked_fill_(~closed, 0.0), closed
+    return contact, begin, end, known & (length > 0) & (length <= max_steps)
 
 
 class CausalContacts:

@@ -14,6 +14,7 @@ import torch
 from mute.command_lines.arguments import (
     LONGEST_WALK,
     MANY_ROBOTS,
+    Numbers,
     Words,
     check_distinct,
     check_option,
@@ -48,8 +49,8 @@ class TerrainArgs(PolicyArgs):
     """Robots that walk, for each kind and level."""
     seconds: float = 20.0
     """Length of an episode, s."""
-    speed: float = 0.5
-    """Commanded forward speed, m/s."""
+    speed: Numbers = (0.5,)
+    """Commanded forward speeds, m/s, at each of which every kind and level is crossed."""
     beta: float = 0.0
     """Quiet factor."""
     seed: int = 1
@@ -74,9 +75,10 @@ def terrain(args: TerrainArgs) -> int:
     make_directory(args.out)
     torch.set_num_threads(1)  # the physics engine has the cores
     places = [
-        (kind, level)
+        (kind, level, speed)
         for kind in args.kinds
         for level in (args.levels if kind != "flat" else args.levels[:1])
+        for speed in args.speed
     ]
     rows: list[dict[str, Any]] = []
     status, done = 0, 0.0
@@ -88,9 +90,9 @@ def terrain(args: TerrainArgs) -> int:
                 done += policy.cfg.env.step_dt
                 bar(done)
 
-            for kind, level in places:
+            for kind, level, speed in places:
                 cfg = crossing_cfg(policy, kind, level, args.episodes, args.seconds, args.seed)
-                row = cross(policy, cfg, args.speed, args.beta, args.seconds, advance)
+                row = cross(policy, cfg, speed, args.beta, args.seconds, advance)
                 rows.append(row.as_dict())
     except KeyboardInterrupt as stop:
         print(f"interrupted; measured: {len(rows)} of {len(places)}", file=sys.stderr)
@@ -103,7 +105,6 @@ def terrain(args: TerrainArgs) -> int:
             "iteration": policy.iteration,
             "commit": current_commit(),
             "machine": machine_kind(),
-            "speed": args.speed,
             "beta": args.beta,
             "seconds": args.seconds,
             "seed": args.seed,
@@ -134,5 +135,7 @@ def _check(args: TerrainArgs) -> None:
         raise MuteError(f"--kinds must be of {', '.join(KINDS)}, got {unknown[0]!r}")
     for level in args.levels:
         check_option("levels", level, Range(0, LEVELS - 1, whole=True))
-    check_option("speed", args.speed, Range(0.0, 2.0, above=True))
+    check_distinct("speed", args.speed)
+    for speed in args.speed:
+        check_option("speed", speed, Range(0.0, 2.0, above=True))
     check_option("beta", args.beta, Range(0.0, 1.0))

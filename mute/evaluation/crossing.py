@@ -34,6 +34,8 @@ class Crossing:
     """Kind of ground."""
     level: int
     """Its level."""
+    speed: float
+    """Commanded forward speed, m/s."""
     episodes: int
     """Robots, one episode each."""
     success: float
@@ -53,6 +55,12 @@ class Crossing:
     """The same of the mean map of this kind and level, m."""
     phase_mae: float
     """Estimator: mean absolute error of the phase."""
+    phase_mae_clock: float
+    """The same of a clock, see `EstimationErrors`."""
+    contact_time_mae: float
+    """Estimator: mean absolute error of the time until a foot that swings lands, s."""
+    contact_time_mae_clock: float
+    """The same of the clock, s."""
 
     def as_dict(self) -> dict[str, float | int | str]:
         """Return the figures by name."""
@@ -159,6 +167,7 @@ def cross(
     return Crossing(
         kind=cfg.terrain.kind,
         level=cfg.terrain.first_levels[0],
+        speed=speed,
         episodes=cfg.num_envs,
         success=float((~ended & (share > _ENOUGH)).double().mean()),
         falls=float(fallen.double().mean()),
@@ -168,4 +177,7 @@ def cross(
         height_rmse_flat=flat,
         height_rmse_mean=mean,
         phase_mae=errors.phase_mae,
+        phase_mae_clock=errors.phase_mae_clock,
+        contact_time_mae=errors.contact_time_mae,
+        contact_time_mae_clock=errors.contact_time_mae_clock,
     )

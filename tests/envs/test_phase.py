@@ -7,7 +7,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mute.envs.phase import CausalContacts, debounce, hindsight_phase
+from mute.envs.phase import CausalContacts, debounce, hindsight_phase, hindsight_swing
 
 SEGMENTS = st.lists(st.integers(2, 9), min_size=1, max_size=8)
 SAMPLES = st.lists(st.booleans(), min_size=1, max_size=40)
@@ -260,6 +260,14 @@ def test_causal_phase_is_age_over_the_last_duration_clipped():
     phase = _play("11" + "000000" + "11111111", "phase", **nominal)
     assert phase[3:8] == pytest.approx([0.25, 0.5, 0.75, 1.0, 1.0])
     assert phase[9:] == pytest.approx([0.8, 0.6, 0.4, 0.2, 0.0, 0.0, 0.0])
+
+
+def test_hindsight_tells_how_long_a_swing_still_lasts():
+    contacts = _column("1110000111110011")
+    left, length, swings = (x.flatten() for x in hindsight_swing(contacts, _starts(contacts)))
+    assert swings.tolist() == [c == "s" for c in "...ssss.....ss.."]
+    assert left[swings].tolist() == [4, 3, 2, 1, 2, 1]
+    assert length[swings].tolist() == [4, 4, 4, 4, 2, 2]
 
 
 def test_causal_phase_of_a_steady_gait_is_the_hindsight_phase_once_events_are_confirmed():

@@ -48,14 +48,23 @@ def test_each_kind_and_level_is_a_row_and_flat_ground_but_one(policy_path, tmp_p
         assert 0.0 <= row["success"] <= 1.0
         assert 0.0 <= row["falls"] <= 1.0
         assert all(row[name] > 0.0 for name in ("velocity_rmse", "height_rmse", "height_rmse_mean"))
-    assert {"policy_sha256", "trained_seed", "commit", "machine", "speed", "beta"} <= printed.keys()
+    assert {"policy_sha256", "trained_seed", "commit", "machine", "beta"} <= printed.keys()
     lines = (tmp_path / "terrain.csv").read_text().splitlines()
     assert len(lines) == 4
     assert lines[0].split(",") == list(rows[0])
 
 
 def _made_up(kind: str, level: int) -> Crossing:
-    return Crossing(kind, level, 2, 1.0, 0.0, 0.9, 0.1, 0.02, 0.01, 0.01, math.nan)
+    shares, errors = (1.0, 0.0, 0.9), (0.1, 0.02, 0.01, 0.01)
+    return Crossing(kind, level, 0.5, 2, *shares, *errors, *[math.nan] * 4)
+
+
+def test_every_speed_is_a_row(policy_path, tmp_path, capsys):
+    words = _words(policy_path, tmp_path, "--kinds", "flat", "--speed", "0.3,0.6", "--json")
+    assert evaluate.main(words) == 0
+    rows = json.loads(capsys.readouterr().out)["crossings"]
+    assert [row["speed"] for row in rows] == [0.3, 0.6]
+    assert rows[0]["made"] != rows[1]["made"]
 
 
 def test_what_an_interrupt_leaves_whole_is_written(policy_path, tmp_path, monkeypatch, capsys):
@@ -87,6 +96,7 @@ def test_what_an_interrupt_leaves_whole_is_written(policy_path, tmp_path, monkey
         (["--episodes", "0"], "--episodes must be an integer >= 1 .* got 0"),
         (["--seconds", "1"], "--seconds must be > 1 .* got 1"),
         (["--speed", "0"], "--speed must be > 0 .* got 0"),
+        (["--speed", "0.5,0.5"], "--speed must name each but once"),
         (["--beta", "1.5"], "--beta must be .* got 1.5"),
         (["--seed", "-1"], "--seed must be .* got -1"),
         (["--policy", "missing.pt"], r"missing\.pt"),
