@@ -18,7 +18,9 @@ from mute.command_lines.calibrate import REFERENCES
 from mute.command_lines.card_benchmark import BenchmarkFiles, benchmark_page
 from mute.command_lines.card_reliability import SeedFiles, read_seeds
 from mute.command_lines.card_results import ResultFiles, results_page
-from mute.command_lines.card_sound import predicted_and_measured, with_levels
+from mute.command_lines.card_sound import predicted_and_measured
+from mute.command_lines.card_tables import with_part
+from mute.command_lines.card_terrain import terrain_figures, terrain_speed
 from mute.evaluation.paper_levels import PAPER_LEVELS
 from mute.evaluation.tables import read_json
 from mute.support.errors import MuteError
@@ -44,11 +46,14 @@ class CardArgs:
     """Directory of what `evaluate.py reliability` wrote of several seeds, as seed0.json, seed1.json
     and so on, with what `evaluate.py progress` wrote of each as seed0_progress.json, and
     `evaluate.py gait` as seed0_gait.json."""
+    terrain: Path = _DOCS / "terrain" / "terrain.json"
+    """File that `evaluate.py terrain` wrote; speed.json of `benchmarks.terrain` lies beside it."""
     benchmark: Path = _DOCS / "benchmark.json"
     """File that `mute.benchmark --out` wrote; peers.json, peer_walks.json, physics.json and
     walking.json lie beside it."""
     out: Path | None = None
-    """Directory of the pages results.md, sound.md and benchmark.md; printed if not given."""
+    """Directory of the pages results.md, sound.md, terrain.md and benchmark.md; printed if not
+    given."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -62,10 +67,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     results = read_results(args)
     pages = {
         "results.md": results_page(results),
-        "sound.md": with_levels(
-            _sound_page(),
+        "sound.md": with_part(
+            _page("sound.md"),
+            "levels",
             predicted_and_measured(results.noise, results.sweep_beta, results.walk, results.fitted),
         ),
+        "terrain.md": _terrain_page(args.terrain),
         "benchmark.md": benchmark_page(read_benchmarks(args)),
     }
     if args.out is None:
@@ -76,6 +83,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         write_file(args.out / name, page.encode())
     print(f"written to {args.out}: {', '.join(pages)}")
     return 0
+
+
+def _terrain_page(path: Path) -> str:
+    """Return the page on ground, of which two parts are made.
+
+    Raises:
+        MuteError: If a file is missing.
+    """
+    page = with_part(_page("terrain.md"), "figures", terrain_figures(_read(path)))
+    speed = _read(path.parent / "speed.json", "rates", "options", "num_envs", "turns", "machine")
+    return with_part(page, "speed", terrain_speed(speed))
 
 
 def read_results(args: CardArgs) -> ResultFiles:
@@ -141,13 +159,13 @@ def _check_trainings(folder: Path, card: Mapping[str, Any], seeds: Mapping[int, 
                 raise MuteError(f"{path} has betas {told} in {part}, what ships has {betas}")
 
 
-def _sound_page() -> str:
-    """Return the page that one part of is made here.
+def _page(name: str) -> str:
+    """Return a page that one part of is made here.
 
     Raises:
         MuteError: If it is not there.
     """
-    path = _DOCS / "sound.md"
+    path = _DOCS / name
     if not path.is_file():
         raise MuteError(f"no file at {path}")
     return path.read_text()

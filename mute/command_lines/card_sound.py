@@ -14,10 +14,7 @@ from mute.evaluation.intervals import with_interval
 from mute.evaluation.paper_levels import PAPER_AT_08, PAPER_LEVELS, PAPER_WALK
 from mute.support.errors import MuteError
 
-__all__ = ["BEGIN", "END", "predicted_and_measured", "with_levels"]
-
-BEGIN, END = "<!-- levels -->", "<!-- /levels -->"
-"""What the part stands between."""
+__all__ = ["predicted_and_measured"]
 
 _METHODS = {"mute beta 0": 0.0, "mute beta 1": 1.0}
 """The paper's rows that there are policies for, and their beta."""
@@ -31,18 +28,6 @@ _COLUMNS = {
     "paper_pnl": ("paper", "{:.1f}"),
     "pnl_off": ("off by", "{}"),
 }
-
-
-def with_levels(page: str, part: str) -> str:
-    """Return a page with another part between its marks.
-
-    Raises:
-        MuteError: If the marks are not there.
-    """
-    if BEGIN not in page or END not in page:
-        raise MuteError(f"docs/sound.md has no {BEGIN} and {END}")
-    before, rest = page.split(BEGIN, 1)
-    return f"{before}{BEGIN}\n\n{part}\n\n{END}{rest.split(END, 1)[1]}"
 
 
 def predicted_and_measured(

@@ -6,6 +6,8 @@ import statistics
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mute.support.errors import MuteError
+
 __all__ = [
     "cut_short",
     "markdown",
@@ -13,6 +15,7 @@ __all__ = [
     "spread_of_trials",
     "times",
     "usual_rows",
+    "with_part",
 ]
 
 
@@ -74,3 +77,16 @@ def times(value: float | None, factor: float) -> float | None:
 def usual_rows(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """Return the rows of a table of levels that are of robots as they are."""
     return [row for row in rows if row["robots"] == "different"]
+
+
+def with_part(page: str, mark: str, part: str) -> str:
+    """Return a page with another part between its marks, `<!-- mark -->` and `<!-- /mark -->`.
+
+    Raises:
+        MuteError: If the marks are not there.
+    """
+    begin, end = f"<!-- {mark} -->", f"<!-- /{mark} -->"
+    if begin not in page or end not in page:
+        raise MuteError(f"the page has no {begin} and {end}")
+    before, rest = page.split(begin, 1)
+    return f"{before}{begin}\n\n{part}\n\n{end}{rest.split(end, 1)[1]}"

@@ -1,10 +1,11 @@
-"""`evaluate.py terrain`: how a policy gets over every kind of ground, and what it knows of it."""
+"""`evaluate.py terrain`: how a policy gets over every kind of ground, and how much it bears."""
 
 from __future__ import annotations
 
 import json
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,9 +25,11 @@ from mute.command_lines.arguments import (
 from mute.command_lines.policy_options import PolicyArgs
 from mute.command_lines.sound_options import progress_bar
 from mute.controllers import load_policy
+from mute.controllers.learned import Policy
 from mute.envs.terrain import KINDS
 from mute.envs.terrain.figures import LEVELS
 from mute.evaluation.crossing import cross, crossing_cfg
+from mute.evaluation.endurance import HARDSHIPS, LONGEST_PUSHES, be_pushed, bear, walk_at_random
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.support.errors import MuteError
 from mute.support.plain_data import without_nan
@@ -37,34 +40,59 @@ from mute.support.signals import exit_status
 __all__ = ["TerrainArgs", "terrain"]
 
 
+_PARTS = ("crossings", "hardships", "pushes", "walk")
+
+
 @dataclass
 class TerrainArgs(PolicyArgs):
-    """How a policy gets over every kind of ground and level, with robots that differ in all."""
+    """How a policy gets over every kind of ground and level, and how much it bears on flat ground.
 
+    Robots differ in everything.
+    """
+
+    parts: Words = _PARTS
+    """What to measure: crossings, of kinds and levels; hardships, one at a time; pushes until the
+    fall; walk, half an hour at random commands."""
     kinds: Words = tuple(KINDS)
     """Kinds of ground: flat, slopes, uneven, blocks, stairs, stairs_down, rooms."""
     levels: tuple[int, ...] = tuple(range(LEVELS))
     """Levels of each, 0 to 4; flat ground has but one."""
     episodes: int = 512
-    """Robots that walk, for each kind and level."""
+    """Robots that walk, for each kind, level and hardship."""
     seconds: float = 20.0
     """Length of an episode, s."""
     speed: Numbers = (0.5,)
     """Commanded forward speeds, m/s, at each of which every kind and level is crossed."""
     beta: float = 0.0
     """Quiet factor."""
+    walkers: int = 64
+    """Robots that are pushed until they fall, and that walk at random."""
+    minutes: float = 30.0
+    """How long those walk, min."""
     seed: int = 1
-    """Seed of ground, robots, first states and noise."""
+    """Seed of ground, robots, first states, noise, pushes and commands."""
     out: Path = Path("evaluation")
     """Directory of the CSV and JSON files."""
     json: bool = False
     """Print one JSON object with the figures on standard output, and nothing else there."""
 
 
+@dataclass
+class _Task:
+    """One row to be measured."""
+
+    part: str
+    """Table that it is a row of."""
+    seconds: float
+    """How long robots walk for it, s."""
+    measure: Callable[[Callable[[], None]], dict[str, Any]]
+    """Returns it; calls what it is given after each control step."""
+
+
 def terrain(args: TerrainArgs) -> int:
     """Measure, print and write; return the exit status.
 
-    An interrupt keeps the kinds and levels that are whole.
+    An interrupt keeps the rows that are whole.
 
     Raises:
         MuteError: If an argument is bad, or the policy cannot be used.
@@ -74,30 +102,25 @@ def terrain(args: TerrainArgs) -> int:
     policy = load_policy(args.policy)
     make_directory(args.out)
     torch.set_num_threads(1)  # the physics engine has the cores
-    places = [
-        (kind, level, speed)
-        for kind in args.kinds
-        for level in (args.levels if kind != "flat" else args.levels[:1])
-        for speed in args.speed
-    ]
-    rows: list[dict[str, Any]] = []
-    status, done = 0, 0.0
+    tasks = [task for task in _tasks(args, policy) if task.part in args.parts]
+    tables: dict[str, list[dict[str, Any]]] = {}
+    status, done, whole = 0, 0.0, 0
     try:
-        with progress_bar("terrain", len(places) * args.seconds) as bar:
+        with progress_bar("terrain", sum(task.seconds for task in tasks)) as bar:
 
             def advance() -> None:
                 nonlocal done
                 done += policy.cfg.env.step_dt
                 bar(done)
 
-            for kind, level, speed in places:
-                cfg = crossing_cfg(policy, kind, level, args.episodes, args.seconds, args.seed)
-                row = cross(policy, cfg, speed, args.beta, args.seconds, advance)
-                rows.append(row.as_dict())
+            for task in tasks:
+                tables.setdefault(task.part, []).append(task.measure(advance))
+                whole += 1
     except KeyboardInterrupt as stop:
-        print(f"interrupted; measured: {len(rows)} of {len(places)}", file=sys.stderr)
+        print(f"interrupted; measured: {whole} of {len(tasks)}", file=sys.stderr)
         status = exit_status(stop)
-    if rows:
+    tables = {part: rows for part, rows in tables.items() if rows}
+    if tables:
         about = {
             "policy": os.path.relpath(args.policy, REPOSITORY),
             "policy_sha256": file_sha256(args.policy),
@@ -109,33 +132,90 @@ def terrain(args: TerrainArgs) -> int:
             "seconds": args.seconds,
             "seed": args.seed,
         }
-        _report(args, about, rows)
+        _report(args, about, tables)
     return status
 
 
-def _report(args: TerrainArgs, about: dict[str, Any], rows: list[dict[str, Any]]) -> None:
-    content = about | {"crossings": rows}
+def _tasks(args: TerrainArgs, policy: Policy) -> list[_Task]:
+    """Return all rows that there may be, in the order of `_PARTS`."""
+    beta, seed, seconds = args.beta, args.seed, args.seconds
+
+    def crossing(kind: str, level: int, speed: float) -> _Task:
+        def measure(advance: Callable[[], None]) -> dict[str, Any]:
+            cfg = crossing_cfg(policy, kind, level, args.episodes, seconds, seed)
+            return cross(policy, cfg, speed, beta, seconds, advance).as_dict()
+
+        return _Task("crossings", seconds, measure)
+
+    def hardship(name: str) -> _Task:
+        def measure(advance: Callable[[], None]) -> dict[str, Any]:
+            return bear(policy, name, args.episodes, seconds, beta, seed, advance).as_dict()
+
+        return _Task("hardships", seconds, measure)
+
+    def pushes(advance: Callable[[], None]) -> dict[str, Any]:
+        return be_pushed(policy, args.walkers, beta, seed, advance).as_dict()
+
+    def walk(advance: Callable[[], None]) -> dict[str, Any]:
+        return walk_at_random(policy, args.walkers, args.minutes, beta, seed, advance).as_dict()
+
+    return [
+        *(
+            crossing(kind, level, speed)
+            for kind in args.kinds
+            for level in (args.levels if kind != "flat" else args.levels[:1])
+            for speed in args.speed
+        ),
+        *map(hardship, HARDSHIPS),
+        _Task("pushes", LONGEST_PUSHES, pushes),
+        _Task("walk", 60.0 * args.minutes, walk),
+    ]
+
+
+_TITLES = {
+    "crossings": "ground: {0.episodes} episodes of {0.seconds:g} s",
+    "hardships": "hardships: {0.episodes} episodes of {0.seconds:g} s on flat ground",
+    "pushes": "pushes along any direction every second, each stronger, until the fall",
+    "walk": "random commands, drawn anew every 10 s",
+}
+
+
+def _report(
+    args: TerrainArgs, about: dict[str, Any], tables: dict[str, list[dict[str, Any]]]
+) -> None:
+    content = about | tables
     write_json(args.out / "terrain.json", content)
-    write_csv(args.out / "terrain.csv", rows)
+    names = ["terrain.json"]
+    for part, rows in tables.items():
+        names.append("terrain.csv" if part == "crossings" else f"terrain_{part}.csv")
+        write_csv(args.out / names[-1], rows)
     if args.json:
         print(json.dumps(without_nan(content), allow_nan=False))
         return
-    print_table(f"{args.episodes} episodes of {args.seconds:g} s", rows, list(rows[0]))
-    print(f"written: {args.out}/terrain.json, terrain.csv")
+    for part, rows in tables.items():
+        print_table(_TITLES[part].format(args), rows, list(rows[0]))
+    print(f"written to {args.out}: {', '.join(names)}")
 
 
 def _check(args: TerrainArgs) -> None:
     check_option("episodes", args.episodes, MANY_ROBOTS)
+    check_option("walkers", args.walkers, MANY_ROBOTS)
     check_option("seconds", args.seconds, Range(1.0, LONGEST_WALK, above=True))
+    check_option("minutes", args.minutes, Range(0.0, LONGEST_WALK / 60.0, above=True))
     check_seed(args.seed)
-    check_distinct("kinds", args.kinds)
+    _check_words("parts", args.parts, _PARTS)
+    _check_words("kinds", args.kinds, tuple(KINDS))
     check_distinct("levels", args.levels)
-    unknown = [name for name in args.kinds if name not in KINDS]
-    if unknown:
-        raise MuteError(f"--kinds must be of {', '.join(KINDS)}, got {unknown[0]!r}")
     for level in args.levels:
         check_option("levels", level, Range(0, LEVELS - 1, whole=True))
     check_distinct("speed", args.speed)
     for speed in args.speed:
         check_option("speed", speed, Range(0.0, 2.0, above=True))
     check_option("beta", args.beta, Range(0.0, 1.0))
+
+
+def _check_words(option: str, words: tuple[str, ...], known: tuple[str, ...]) -> None:
+    check_distinct(option, words)
+    unknown = [word for word in words if word not in known]
+    if unknown:
+        raise MuteError(f"--{option} must be of {', '.join(known)}, got {unknown[0]!r}")

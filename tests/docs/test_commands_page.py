@@ -37,6 +37,7 @@ _MODULES = {
     "-m benchmarks.peer_walks": "benchmarks.peer_walks",
     "-m benchmarks.physics": "benchmarks.physics",
     "-m benchmarks.sound": "benchmarks.sound",
+    "-m benchmarks.terrain": "benchmarks.terrain",
     "examples/listen.py": "listen",
     "examples/run_onnx.py": "run_onnx",
     "examples/side_by_side.py": "side_by_side",

@@ -21,7 +21,7 @@ def files():
     return card.read_results(card.CardArgs())
 
 
-@pytest.mark.parametrize("name", ["results.md", "sound.md", "benchmark.md"])
+@pytest.mark.parametrize("name", ["results.md", "sound.md", "terrain.md", "benchmark.md"])
 def test_a_committed_page_is_what_the_command_makes(name, tmp_path):
     assert card.main(["--out", str(tmp_path)]) == 0
     made, committed = (folder / name for folder in (tmp_path, REPOSITORY / "docs"))
@@ -36,7 +36,7 @@ def test_the_front_page_has_the_table_of_the_results_and_says_what_it_is_of(file
 def test_without_a_directory_all_pages_are_printed(capsys):
     assert card.main([]) == 0
     headings = re.findall("^# .*$", capsys.readouterr().out, re.MULTILINE)
-    assert headings == ["# Results", "# The sound model", "# Speed"]
+    assert headings == ["# Results", "# The sound model", "# Ground", "# Speed"]
 
 
 def test_a_spread_is_that_of_the_trainings(files):

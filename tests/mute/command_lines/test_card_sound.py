@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from mute.command_lines.card_sound import predicted_and_measured, with_levels
+from mute.command_lines.card_sound import predicted_and_measured
+from mute.command_lines.card_tables import with_part
 from mute.evaluation.paper_levels import PAPER_AT_08, PAPER_LEVELS
 from mute.support.errors import MuteError
 
@@ -106,8 +107,8 @@ def test_levels_that_lack_what_is_compared_are_refused(given, words):
 
 def test_a_part_takes_the_place_of_the_one_before():
     page = "# Sound\n\n<!-- levels -->\n\nold\n\n<!-- /levels -->\n\nafter\n"
-    once = with_levels(page, "new")
+    once = with_part(page, "levels", "new")
     assert once == "# Sound\n\n<!-- levels -->\n\nnew\n\n<!-- /levels -->\n\nafter\n"
-    assert with_levels(once, "new") == once
+    assert with_part(once, "levels", "new") == once
     with pytest.raises(MuteError, match="has no <!-- levels -->"):
-        with_levels("# Sound\n", "new")
+        with_part("# Sound\n", "levels", "new")

@@ -12,7 +12,9 @@ from learning_helpers import make_runner
 from mute.checkpoint import save_checkpoint
 from mute.command_lines import evaluate, evaluate_terrain
 from mute.config import to_plain
+from mute.evaluation import endurance
 from mute.evaluation.crossing import Crossing
+from mute.evaluation.endurance import HARDSHIPS
 from mute.evaluation.tables import read_json
 from mute.learning.runner import policy_part
 from mute.support.errors import MuteError
@@ -29,7 +31,8 @@ def policy_path(tmp_path_factory) -> Path:
 
 def _words(policy_path: Path, out: Path, *more: str) -> list[str]:
     words = ["terrain", "--policy", str(policy_path), "--episodes", "2", "--seconds", "1.1"]
-    return [*words, "--out", str(out), *more]
+    parts = [] if "--parts" in more else ["--parts", "crossings"]
+    return [*words, "--out", str(out), *parts, *more]
 
 
 def test_each_kind_and_level_is_a_row_and_flat_ground_but_one(policy_path, tmp_path, capsys):
@@ -52,6 +55,25 @@ def test_each_kind_and_level_is_a_row_and_flat_ground_but_one(policy_path, tmp_p
     lines = (tmp_path / "terrain.csv").read_text().splitlines()
     assert len(lines) == 4
     assert lines[0].split(",") == list(rows[0])
+
+
+def test_what_a_policy_bears_is_told_part_by_part(policy_path, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(endurance, "LONGEST_PUSHES", 2.0)
+    monkeypatch.setattr(evaluate_terrain, "LONGEST_PUSHES", 2.0)
+    words = _words(policy_path, tmp_path, "--parts", "hardships,pushes,walk", "--walkers", "2")
+    assert evaluate.main([*words, "--minutes", "0.02"]) == 0
+    printed = capsys.readouterr().out
+    content = read_json(tmp_path / "terrain.json")
+    assert "crossings" not in content
+    assert [row["hardship"] for row in content["hardships"]] == list(HARDSHIPS)
+    assert all(row["hardship"] in printed for row in content["hardships"])
+    assert content["pushes"][0]["robots"] == content["walk"][0]["robots"] == 2
+    assert content["walk"][0]["minutes"] == 0.02
+    for part in ("hardships", "pushes", "walk"):
+        lines = (tmp_path / f"terrain_{part}.csv").read_text().splitlines()
+        assert len(lines) == 1 + len(content[part])
+        assert f"terrain_{part}.csv" in printed
+    assert not (tmp_path / "terrain.csv").exists()
 
 
 def _made_up(kind: str, level: int) -> Crossing:
@@ -90,6 +112,9 @@ def test_what_an_interrupt_leaves_whole_is_written(policy_path, tmp_path, monkey
     [
         (["--kinds", "stairs,moon"], "--kinds must be of flat, slopes, .* got 'moon'"),
         (["--kinds", "rooms,rooms"], "--kinds must name each but once, got rooms again"),
+        (["--parts", "crossings,tea"], "--parts must be of crossings, .* got 'tea'"),
+        (["--walkers", "0"], "--walkers must be an integer >= 1 .* got 0"),
+        (["--minutes", "0"], "--minutes must be > 0 .* got 0"),
         (["--kinds"], "--kinds must name at least one"),
         (["--levels", "5"], "--levels must be an integer >= 0 and <= 4, got 5"),
         (["--levels", "2", "2"], "--levels must name each but once"),
