@@ -92,7 +92,7 @@ class LeversArgs:
     out: Path = Path("docs/levers")
     """Folder of what is found, one file for each lever and seed."""
     table: bool = False
-    """Train nothing: make the table of what is there."""
+    """Train nothing: make the table of what is there, be it of an earlier recipe."""
     json: bool = False
     """Print JSON and nothing else."""
 
@@ -189,19 +189,22 @@ def _conditions(lever: str, args: LeversArgs) -> dict[str, Any]:
 def _check_same(args: LeversArgs) -> None:
     """Refuse what was found under other conditions.
 
+    A table alone may be of an earlier recipe, if all of it is.
+
     Raises:
         MuteError: If a file tells of any.
     """
-    for lever in args.levers:
-        conditions = _conditions(lever, args)
-        for seed in args.seeds:
-            path = args.out / f"{lever}.{seed}.json"
-            found = read_json(path) if path.exists() else conditions
-            for name, value in conditions.items():
-                if found.get(name) != value:
-                    raise MuteError(
-                        f"{path} has {name} {found.get(name)}, not {value}; move it away"
-                    )
+    paths = {
+        args.out / f"{lever}.{seed}.json": lever for lever in args.levers for seed in args.seeds
+    }
+    files = {path: read_json(path) for path in paths if path.exists()}
+    first = next(iter(files.values()), {})
+    kept = {name: first[name] for name in ("recipe", "iterations") if name in first}
+    for path, found in files.items():
+        conditions = _conditions(paths[path], args) | (kept if args.table else {})
+        for name, value in conditions.items():
+            if found.get(name) != value:
+                raise MuteError(f"{path} has {name} {found.get(name)}, not {value}; move it away")
 
 
 def _judged(lever: str, seed: int, args: LeversArgs) -> dict[str, Any]:

@@ -140,6 +140,13 @@ def test_files_of_another_recipe_are_not_taken_for_this_one(programs, tmp_path, 
     monkeypatch.setattr(levers, "make_task", lambda name: changed)
     with pytest.raises(MuteError, match=r"recipe\.0\.json has recipe "):
         _main(tmp_path, *words)
+    # To show them trains nothing, and all are of one recipe; but no other may stand among them.
+    assert _main(tmp_path, *words, "--table") == 0
+    first = tmp_path / "found" / "recipe.0.json"
+    other = json.loads(first.read_text()) | {"recipe": "12345678"}
+    (tmp_path / "found" / "recipe.1.json").write_text(json.dumps(other))
+    with pytest.raises(MuteError, match=r"recipe\.1\.json has recipe 12345678"):
+        _main(tmp_path, "--levers", "recipe", "--seeds", "0", "1", "--table")
 
 
 def test_a_table_of_nothing_says_so(tmp_path):
