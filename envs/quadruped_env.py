@@ -139,7 +139,9 @@ class QuadrupedEnv(VecEnv):
         self.step_count += 1
         self.episode_length_buf += 1
         self._read_state()
-        self.travelled.update(self.commands.command, self.base_lin_vel, self.step_dt)
+        self.travelled.update(
+            self.base_pos[:, :2], self.commands.command, self.base_lin_vel, self.step_dt
+        )
         self.fallen = self._falls()
         factors = self.curriculum
         motion = self._motion(phase)
@@ -208,7 +210,7 @@ class QuadrupedEnv(VecEnv):
         state["followed"] = self.followed.state_dict()
         state["travelled"] = self.travelled.state_dict()
         if isinstance(self.ground, BoxGround):
-            state["ground"] = {"level": self.ground.level.clone(), "key": self.ground.key.clone()}
+            state["ground"] = self.ground.state_dict()
         state["encoder_offset"] = self.encoder_offset.clone()
         state["imu"] = None if self.imu is None else self.imu.clone()
         state["observations"] = {key: value.clone() for key, value in self._observations.items()}
@@ -235,9 +237,7 @@ class QuadrupedEnv(VecEnv):
             imu = state["imu"]
             self.imu = None if imu is None else imu.to(self.device, copy=True)
         if isinstance(self.ground, BoxGround):
-            self.ground.level = state["ground"]["level"].to(self.device, copy=True)
-            self.ground.key = state["ground"]["key"].to(self.device, copy=True)
-            self.ground.lay(self.simulation.qpos[:, :2], self._everyone())
+            self.ground.load_state_dict(state["ground"])
         self._read_state()
         groups = {k: value.to(self.device, copy=True) for k, value in state["observations"].items()}
         self._observations = TensorDict(groups, batch_size=[self.num_envs])
@@ -350,7 +350,7 @@ class QuadrupedEnv(VecEnv):
         self.commands.resample(mask, True, self.curriculum.commands)
         self.footfalls.reset(mask, self._sensors.foot_contact)
         self.followed.reset(mask)
-        self.travelled.reset(mask)
+        self.travelled.reset(mask, self.simulation.qpos[:, :2].float())
         for name in _PAST:
             setattr(self, name, getattr(self, name).masked_fill(mask.unsqueeze(1), 0.0))
         self.episode_length_buf = self.episode_length_buf.masked_fill(mask, 0)
@@ -370,8 +370,7 @@ class QuadrupedEnv(VecEnv):
             return
         unit = torch.rand(2, self.num_envs, generator=self.generator, device=self.device)
         if cfg.curriculum and self.step_count:
-            made, asked = self.travelled.made, self.travelled.asked
-            levels = next_levels(ground.level, made, asked, self.fallen, cfg.crossed, unit[0])
+            levels = next_levels(ground.level, self.travelled, self.fallen, cfg.crossed, unit[0])
             ground.level = torch.where(mask, levels, ground.level)
         ground.key = torch.where(mask, (unit[1] * KEYS).long(), ground.key)
         ground.lay(self.simulation.qpos[:, :2], mask)

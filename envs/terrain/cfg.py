@@ -38,7 +38,7 @@ class TerrainCfg:
     curriculum: bool = True
     """Whether robots that get ahead go on to higher levels, and others back to lower ones."""
     crossed: float = 4.0
-    """Distance that a robot gets ahead, along its commands in an episode, to go up a level, m."""
+    """Distance from its start that a robot gets in an episode to go up a level, m."""
 
     def __post_init__(self) -> None:
         """Check the fields.

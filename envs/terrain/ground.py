@@ -149,6 +149,17 @@ class BoxGround(Ground):
             if KINDS[name].boxes and len(chosen):
                 self._lay(KINDS[name], chosen, xy[chosen])
 
+    def state_dict(self) -> dict[str, torch.Tensor]:
+        """Return all that is needed to continue bit for bit; the boxes are the simulation's."""
+        return {"level": self.level.clone(), "key": self.key.clone(), "cell": self._cell.clone()}
+
+    def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
+        """Continue from a `state_dict`, where the simulation does so as well."""
+        device = self.level.device
+        self.level = state["level"].to(device, copy=True)
+        self.key = state["key"].to(device, copy=True)
+        self._cell = state["cell"].to(device, copy=True)
+
     def drawn(self, robot: int, xy: torch.Tensor) -> tuple[Layout, float]:
         """Return the boxes of a robot's ground as far as one looks, and the height of its plane.
 

@@ -14,6 +14,7 @@ _PARTS = ("crossings", "hardships", "pushes", "walk")
 _CROSSINGS = {
     "kind": ("ground", "{}"),
     "level": ("level", "{}"),
+    "speed": ("m/s", "{:g}"),
     "success": ("gets across", "{:.0%}"),
     "falls": ("falls", "{:.0%}"),
     "made": ("distance made", "{:.0%}"),
@@ -64,7 +65,8 @@ def terrain_figures(measured: Mapping[str, Any]) -> str:
         told.append(
             f"The largest push before the fall is {row['largest']:.2f} ± {row['deviation']:.2f} "
             f"m/s over {row['robots']} robots, along any direction of space, each 0.05 m/s "
-            "stronger than the one a second before (DreamWaQ's paper has 1.12 ± 0.16 m/s)."
+            "stronger than the one a second before (DreamWaQ's paper has 1.12 ± 0.16 m/s, of "
+            "pushes whose strength it does not tell)."
         )
     if measured.get("walk"):
         [row] = measured["walk"]

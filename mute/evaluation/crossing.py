@@ -39,12 +39,13 @@ class Crossing:
     episodes: int
     """Robots, one episode each."""
     success: float
-    """Share of them that did not fall and got more than 80 % of the commanded distance; one whose
-    simulation turned unstable is not among them, and did not fall."""
+    """Share of them that did not fall and got more than 80 % of the commanded distance ahead, from
+    where and as they began; one whose simulation turned unstable is not among them, and did not
+    fall."""
     falls: float
     """Share that fell."""
     made: float
-    """Distance along the command over the commanded one, until a fall, mean."""
+    """Distance ahead over the commanded one, until a fall, mean."""
     velocity_rmse: float
     """Estimator: root of the mean squared error of the velocity over axes, m/s."""
     height_rmse: float
@@ -72,7 +73,7 @@ class HeightBaselines:
 
     One takes the ground to be level at the mean height of the feet that stand, which a robot can
     tell from its joints and its tilt. The other always says the mean map, which is known only
-    afterwards: it is as good as any that does not look.
+    afterwards: no map that is always the same is better.
     """
 
     def __init__(self, env: QuadrupedEnv) -> None:
@@ -82,28 +83,32 @@ class HeightBaselines:
         self._flat = 0.0
         self._sum = torch.zeros(points, dtype=torch.float64)
         self._squares = torch.zeros(points, dtype=torch.float64)
-        self._steps = 0
+        self._count = 0
 
-    def update(self) -> None:
-        """Take in where the robots are now."""
+    def update(self, counted: torch.Tensor) -> None:
+        """Take in where some robots are now.
+
+        Args:
+            counted: Which of them. Shape: (num_envs,), bool.
+        """
         env = self._env
-        heights = env.ground.height_map(env.grid, env.base_pos, env.heading).double()
-        feet = env.foot_pos[:, :, 2].double() - FOOT_RADIUS
-        down = env.footfalls.contact.double()
+        heights = env.ground.height_map(env.grid, env.base_pos, env.heading)[counted].double()
+        feet = env.foot_pos[counted, :, 2].double() - FOOT_RADIUS
+        down = env.footfalls.contact[counted].double()
         # Of a robot in the air, the mean of all four.
         weight = torch.where(down.sum(dim=1, keepdim=True) > 0.0, down, torch.ones_like(down))
         ground = (feet * weight).sum(dim=1) / weight.sum(dim=1)
-        level = (env.base_pos[:, 2] - ground)[:, None]
-        self._flat += float((heights - level).square().mean())
-        self._sum += heights.mean(dim=0)
-        self._squares += heights.square().mean(dim=0)
-        self._steps += 1
+        level = (env.base_pos[counted, 2] - ground)[:, None]
+        self._flat += float((heights - level).square().mean(dim=1).sum())
+        self._sum += heights.sum(dim=0)
+        self._squares += heights.square().sum(dim=0)
+        self._count += len(heights)
 
     def errors(self) -> tuple[float, float]:
         """Return the root mean squared errors of the level map and of the mean map, m."""
-        mean = self._sum / self._steps
-        spread = (self._squares / self._steps - mean.square()).clamp(min=0.0)
-        return (self._flat / self._steps) ** 0.5, float(spread.mean()) ** 0.5
+        mean = self._sum / self._count
+        spread = (self._squares / self._count - mean.square()).clamp(min=0.0)
+        return (self._flat / self._count) ** 0.5, float(spread.mean()) ** 0.5
 
 
 def crossing_cfg(
@@ -145,18 +150,24 @@ def cross(
     """
     env = QuadrupedEnv(cfg)
     controller = LearnedController(policy, cfg.num_envs)
-    estimation, baselines = EstimationMeter(env, controller), HeightBaselines(env)
+    estimation = EstimationMeter(env, controller, first_episodes=True)
+    baselines = HeightBaselines(env)
     made = torch.zeros(cfg.num_envs)
+    way: list[torch.Tensor] = []
     fallen = torch.zeros(cfg.num_envs, dtype=torch.bool)
     ended = fallen.clone()
 
     def watch(observations: TensorDict, dones: torch.Tensor) -> None:
         estimation(observations, dones)
-        baselines.update()
         fallen.logical_or_(env.fallen)
         # Who has ended before the time begins anew, of which nothing counts.
         ended.logical_or_(dones)
-        made.add_(torch.where(ended, 0.0, env.step_dt * env.base_lin_vel[:, 0]))
+        if not way:
+            way.extend((env.base_pos[:, :2].clone(), env.heading.clone()))
+        ahead = ((env.base_pos[:, :2] - way[0]) * way[1]).sum(dim=1)
+        made.copy_(torch.where(ended, made, ahead))
+        if not bool(ended.all()):
+            baselines.update(~ended)
         on_step()
 
     command = torch.tensor((speed, 0.0, 0.0, beta))

@@ -62,7 +62,7 @@ class Hardship:
     robots: int
     """Robots, one episode each."""
     survived: float
-    """Share that did not fall."""
+    """Share that neither fell nor had its simulation turn unstable."""
     made: float
     """Distance along the command over the commanded one, until a fall, mean."""
 
@@ -98,7 +98,7 @@ class LongWalk:
     minutes: float
     """How long they walked, min."""
     survived: float
-    """Share that did not fall."""
+    """Share that neither fell nor had its simulation turn unstable."""
     velocity_rmse: float
     """Root of the mean squared error of the horizontal velocity, until a fall, m/s."""
     yaw_rate_rmse: float
@@ -148,14 +148,12 @@ def bear(
     generator = torch.Generator().manual_seed(seed)
     interval = round(_PUSH_INTERVAL / env.step_dt)
     made = torch.zeros(robots)
-    fallen = torch.zeros(robots, dtype=torch.bool)
-    ended = fallen.clone()
+    ended = torch.zeros(robots, dtype=torch.bool)
     steps = 0
 
     def watch(_: TensorDict, dones: torch.Tensor) -> None:
         nonlocal steps
         steps += 1
-        fallen.logical_or_(env.fallen)
         ended.logical_or_(dones)
         made.add_(torch.where(ended, 0.0, env.step_dt * env.base_lin_vel[:, 0]))
         if hardship.startswith("pushes") and steps % interval == 0:
@@ -166,7 +164,7 @@ def bear(
     controller = LearnedController(policy, robots)
     run_trial(env, controller, command, round(seconds / env.step_dt), watch)
     share = float((made / (_SPEED * seconds)).mean())
-    return Hardship(hardship, robots, 1.0 - float(fallen.double().mean()), share)
+    return Hardship(hardship, robots, 1.0 - float(ended.double().mean()), share)
 
 
 def be_pushed(
@@ -228,7 +226,7 @@ def walk_at_random(
     controller = LearnedController(policy, robots)
     sampler = command_sampler(_commands(policy.cfg.env.commands, beta), robots, seed)
     everyone = torch.ones(robots, dtype=torch.bool)
-    fallen, ended = ~everyone, ~everyone
+    ended = ~everyone
     squares, counted = torch.zeros(2, dtype=torch.float64), 0
     env.reset()
     hold = round(COMMAND_TIME / env.step_dt)
@@ -237,7 +235,6 @@ def walk_at_random(
             sampler.resample(everyone, with_beta=True)
             env.set_command(sampler.command)
         _, _, dones, _ = env.step(controller.act(env.get_observations()))
-        fallen |= env.fallen
         ended |= dones
         if bool(dones.any()):
             controller.reset(dones)
@@ -249,7 +246,7 @@ def walk_at_random(
         counted += int(left.sum())
         on_step()
     velocity, yaw = (squares / max(counted, 1)).sqrt().tolist()
-    return LongWalk(robots, minutes, 1.0 - float(fallen.double().mean()), velocity, yaw)
+    return LongWalk(robots, minutes, 1.0 - float(ended.double().mean()), velocity, yaw)
 
 
 def _make_env(

@@ -8,7 +8,7 @@ import torch
 from tensordict import TensorDict
 
 from mute.controllers.learned import LearnedController
-from mute.envs.phase import hindsight_phase, hindsight_swing
+from mute.envs.phase import CausalContacts, hindsight_phase, hindsight_swing
 from mute.envs.quadruped_env import QuadrupedEnv
 
 __all__ = ["EstimationErrors", "EstimationMeter"]
@@ -31,7 +31,7 @@ class EstimationErrors:
     """Mean absolute error, in a swing, of the time until the foot lands, s: of what the phase
     leaves of a swing of mean length."""
     contact_time_mae_clock: float
-    """The same of the clock, s."""
+    """The same of the clock, s: what is left of as long a swing as the foot's last one."""
     phase_known: float
     """Share of the samples in which it is; standing feet have no phase."""
 
@@ -46,16 +46,25 @@ class EstimationMeter:
     To be called after each step of a trial, see `run_trial`'s `on_step`.
     """
 
-    def __init__(self, env: QuadrupedEnv, controller: LearnedController) -> None:
-        """Start at zero."""
+    def __init__(
+        self, env: QuadrupedEnv, controller: LearnedController, first_episodes: bool = False
+    ) -> None:
+        """Start at zero.
+
+        Args:
+            env: Where the robots walk.
+            controller: Whose estimates are judged.
+            first_episodes: Leave out what robots do once their first episode has ended.
+        """
         self._env = env
         self._controller = controller
+        self._first_episodes = first_episodes
         self._velocity: list[torch.Tensor] = []
         self._height: list[torch.Tensor] = []
         self._contact: list[torch.Tensor] = []
         self._phase: list[torch.Tensor] = []
-        self._clock: list[torch.Tensor] = []
         self._starts: list[torch.Tensor] = [torch.ones(env.num_envs, dtype=torch.bool)]
+        self._counted: list[torch.Tensor] = [torch.ones(env.num_envs, dtype=torch.bool)]
 
     def __call__(self, observations: TensorDict, dones: torch.Tensor) -> None:
         """Take in the observations that were acted on, and which episodes then ended."""
@@ -65,33 +74,62 @@ class EstimationMeter:
         privileged, columns = observations["privileged"], self._env.privileged_slices
         velocity = privileged[:, columns["base_lin_vel"]]
         heights = self._env.cfg.height_map.metres(privileged[:, columns["heights"]])
-        self._velocity.append((estimate.base_lin_vel - velocity).square().mean())
-        self._height.append((estimate.heights - heights).square().mean())
+        self._velocity.append((estimate.base_lin_vel - velocity).square().mean(dim=1))
+        self._height.append((estimate.heights - heights).square().mean(dim=1))
         self._contact.append(privileged[:, columns["contact"]] > 0.5)
         self._phase.append(estimate.phase)
-        self._clock.append(privileged[:, columns["phase"]])
         self._starts.append(dones.clone())
+        left = self._counted[-1] & ~dones if self._first_episodes else self._counted[-1]
+        self._counted.append(left)
 
     def errors(self) -> EstimationErrors:
         """Return the errors so far."""
         feet = self._env.footfalls
-        window = torch.stack(self._contact), torch.stack(self._starts[:-1])
-        truth, known = hindsight_phase(*window, feet.min_steps, feet.max_steps)
-        left, length, swings = hindsight_swing(*window, feet.min_steps, feet.max_steps)
-        usual = length[swings].float().mean()
+        contact, starts = torch.stack(self._contact), torch.stack(self._starts[:-1])
+        counted = torch.stack(self._counted[:-1])
+        window = contact, starts, feet.min_steps, feet.max_steps
+        truth, known = hindsight_phase(*window)
+        left, length, swings = hindsight_swing(*window)
+        known, swings = known & counted[..., None], swings & counted[..., None]
+        usual = length[swings & (left == length)].float().mean()
+        phase, clock = torch.stack(self._phase), _clock(contact, starts, feet.min_steps)
 
-        def errors(phase: torch.Tensor) -> tuple[float, float]:
-            late = ((1.0 - phase[swings]) * usual - left[swings]).abs().mean()
-            return float((phase - truth).abs()[known].mean()), float(late) * self._env.step_dt
+        def phase_error(told: torch.Tensor) -> float:
+            return float((told - truth).abs()[known].mean())
 
-        phase_mae, contact_time_mae = errors(torch.stack(self._phase))
-        phase_mae_clock, contact_time_mae_clock = errors(torch.stack(self._clock))
+        def time_error(told: torch.Tensor) -> float:
+            return float((told - left).abs()[swings].float().mean()) * self._env.step_dt
+
         return EstimationErrors(
-            velocity_rmse=float(torch.stack(self._velocity).mean().sqrt()),
-            height_rmse=float(torch.stack(self._height).mean().sqrt()),
-            phase_mae=phase_mae,
-            phase_mae_clock=phase_mae_clock,
-            contact_time_mae=contact_time_mae,
-            contact_time_mae_clock=contact_time_mae_clock,
+            velocity_rmse=float(torch.stack(self._velocity)[counted].mean().sqrt()),
+            height_rmse=float(torch.stack(self._height)[counted].mean().sqrt()),
+            phase_mae=phase_error(phase),
+            phase_mae_clock=phase_error(clock[0]),
+            contact_time_mae=time_error((1.0 - phase) * usual),
+            contact_time_mae_clock=time_error(clock[1]),
             phase_known=float(known.float().mean()),
         )
+
+
+def _clock(
+    contact: torch.Tensor, starts: torch.Tensor, min_steps: int
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Return what one says who feels every contact, and takes a foot to do as it did the last time.
+
+    Args:
+        contact: Contact of each foot. Shape: (T, N, 4), bool.
+        starts: Where episodes begin. Shape: (T, N), bool.
+        min_steps: Samples that it takes to believe in a change.
+
+    Returns:
+        The phase, and the samples until the foot lands, of no meaning in a stance. Shapes:
+        (T, N, 4).
+    """
+    feet = CausalContacts(contact.shape[1], contact.shape[2], min_steps)
+    phases, left = [], []
+    for raw, begun in zip(contact, starts, strict=True):
+        feet.update(raw)
+        feet.reset(begun, raw)
+        phases.append(feet.phase)
+        left.append((feet.last_air_steps - feet.air_steps).clamp(min=0))
+    return torch.stack(phases), torch.stack(left)

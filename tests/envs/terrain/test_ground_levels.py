@@ -8,49 +8,65 @@ import torch
 from mute.envs.terrain.levels import Travelled, next_levels
 
 
-def _next(level: int, made: float, asked: float, fallen: bool = False, unit: float = 0.5) -> int:
+def _next(
+    level: int, away: float, made: float, asked: float, fallen: bool = False, unit: float = 0.5
+) -> int:
+    travelled = Travelled(1, torch.device("cpu"))
+    travelled.away, travelled.made, travelled.asked = (
+        torch.tensor([value]) for value in (away, made, asked)
+    )
     after = next_levels(
-        torch.tensor([level]),
-        torch.tensor([made]),
-        torch.tensor([asked]),
-        torch.tensor([fallen]),
-        4.0,
-        torch.tensor([unit]),
+        torch.tensor([level]), travelled, torch.tensor([fallen]), 4.0, torch.tensor([unit])
     )
     return int(after)
 
 
 @pytest.mark.parametrize(
-    ("level", "made", "asked", "fallen", "after"),
+    ("level", "away", "made", "asked", "fallen", "after"),
     [
-        (2, 5.0, 8.0, False, 3),  # crossed
-        (2, 5.0, 8.0, True, 2),  # crossed, and fell: far enough not to go down
-        (2, 3.0, 8.0, False, 1),  # less than half
-        (2, 3.0, 5.0, False, 2),  # not far, as it was not asked to go
-        (0, 0.0, 8.0, True, 0),
-        (1, -2.0, 3.0, False, 0),
+        (2, 5.0, 5.0, 8.0, False, 3),  # crossed
+        (2, 5.0, 5.0, 8.0, True, 2),  # crossed, and fell: far enough not to go down
+        (2, 1.0, 7.0, 8.0, False, 2),  # went in circles
+        (2, 3.0, 3.0, 8.0, False, 1),  # less than half
+        (2, 3.0, 3.0, 5.0, False, 2),  # not far, as it was not asked to go
+        (2, 1.0, 1.0, 1.0, True, 1),  # did all that it was asked for until it fell
+        (0, 0.0, 0.0, 8.0, True, 0),
+        (1, 2.0, -2.0, 3.0, False, 0),
     ],
 )
-def test_a_robot_goes_up_where_it_crossed_and_down_where_it_made_less_than_half(
-    level, made, asked, fallen, after
+def test_a_robot_goes_up_where_it_crossed_and_down_where_it_fell_or_made_less_than_half(
+    level, away, made, asked, fallen, after
 ):
-    assert _next(level, made, asked, fallen) == after
+    assert _next(level, away, made, asked, fallen) == after
 
 
 @pytest.mark.parametrize(("unit", "after"), [(0.0, 0), (0.39, 1), (0.99, 4)])
 def test_who_has_solved_them_all_goes_anywhere(unit, after):
-    assert _next(4, 5.0, 8.0, unit=unit) == after
-    assert _next(4, 3.0, 4.0, unit=unit) == 4
+    assert _next(4, 5.0, 5.0, 8.0, unit=unit) == after
+    assert _next(4, 3.0, 3.0, 4.0, unit=unit) == 4
 
 
 def test_what_counts_is_the_way_along_the_command():
     travelled = Travelled(4, torch.device("cpu"))
     command = torch.tensor([[1.0, 0.0, 0.0, 0.0], [0.3, 0.4, 0.0, 0.0], [0.0] * 4, [-1.0, 0, 0, 0]])
     velocity = torch.tensor([[0.5, 0.7, 0.0], [0.6, 0.8, 0.0], [0.4, 0.0, 0.0], [0.2, 0.0, 0.0]])
+    nowhere = torch.zeros(4, 2)
     for _ in range(10):
-        travelled.update(command, velocity, 0.02)
+        travelled.update(nowhere, command, velocity, 0.02)
     torch.testing.assert_close(travelled.made, torch.tensor([0.1, 0.2, 0.0, -0.04]))
     torch.testing.assert_close(travelled.asked, torch.tensor([0.2, 0.1, 0.0, 0.2]))
-    travelled.reset(torch.tensor([True, False, False, False]))
+    travelled.reset(torch.tensor([True, False, False, False]), nowhere)
     assert float(travelled.made[0]) == 0.0
     assert float(travelled.asked[1]) > 0.0
+
+
+def test_how_far_a_robot_is_away_is_from_where_its_episode_began():
+    travelled = Travelled(2, torch.device("cpu"))
+    there = torch.tensor([[1.0, 1.0], [2.0, 0.0]])
+    travelled.reset(torch.tensor([True, False]), there)
+    travelled.update(there + torch.tensor([3.0, 4.0]), torch.zeros(2, 4), torch.zeros(2, 3), 0.02)
+    torch.testing.assert_close(travelled.away, torch.tensor([5.0, 41.0**0.5 * 1.0]))
+    other = Travelled(2, torch.device("cpu"))
+    other.load_state_dict(travelled.state_dict())
+    other.update(there, torch.zeros(2, 4), torch.zeros(2, 3), 0.02)
+    torch.testing.assert_close(other.away, torch.tensor([0.0, 2.0]))

@@ -41,7 +41,7 @@ def test_every_figure_is_there_in_units_that_are_read():
     assert "beta 0.5, 0.4 m/s, 7 robots" in part
     assert "12 s, on a machine" in part
     assert re.search(
-        r"^\| stairs \| 2 \| 25% \| 50% \| 60% \| 31 \| 42 \| 53 \| 25 \| - \|$", part, re.M
+        r"^\| stairs \| 2 \| 0\.4 \| 25% \| 50% \| 60% \| 31 \| 42 \| 53 \| 25 \| - \|$", part, re.M
     )
     assert re.search(r"^\| ice \| 87.5% \| 90% \|$", part, re.M)
     assert "0.80 ± 0.12 m/s over 3 robots" in part

@@ -51,8 +51,11 @@ def _crossed(policy: Policy, monkeypatch: pytest.MonkeyPatch, events: dict[str, 
         for step in range(num_steps):
             observations = env.get_observations()
             controller.act(observations)
-            env.base_lin_vel = torch.zeros(5, 3)
-            env.base_lin_vel[:, 0] = speeds
+            # To the left as well, which is not ahead.
+            env.heading = torch.tensor([[0.0, 1.0]]).repeat(5, 1)
+            env.base_pos = torch.full((5, 3), 0.3)
+            env.base_pos[:, 1] += 0.2 * speeds * step / (num_steps - 1)
+            env.base_pos[:, 0] -= 0.1 * step
             env.fallen = torch.tensor([events["falls"].get(i) == step for i in range(5)])
             unstable = torch.tensor([events["unstable"].get(i) == step for i in range(5)])
             on_step(observations, env.fallen | unstable)
@@ -67,7 +70,7 @@ def test_a_success_is_more_than_80_percent_of_the_way_without_a_fall(policy, mon
     # The first two; the third made 78 %, the fourth fell, and the fifth's physics broke.
     assert row.success == pytest.approx(2 / 5)
     assert row.falls == pytest.approx(1 / 5)
-    shares = [1.0, 0.82, 0.78, 0.5, 0.9]  # until the fall, and until the numbers were bad
+    shares = [1.0, 0.82, 0.78, 4 / 9, 8 / 9]  # until the fall, and until the numbers were bad
     assert row.made == pytest.approx(sum(shares) / 5)
     assert (row.kind, row.level, row.episodes) == ("stairs", 1, 5)
     assert set(row.as_dict()) == {field.name for field in dataclasses.fields(row)}
@@ -91,7 +94,7 @@ def _standing(heights: list[list[float]], feet: list[float], down: list[bool]) -
 def test_the_level_map_lies_at_the_mean_height_of_the_feet_that_stand():
     env = _standing([[0.0, 0.1, 0.0]], feet=[0.1, 0.0, 0.5, 0.5], down=[True, True, False, False])
     meter = HeightBaselines(env)
-    meter.update()
+    meter.update(torch.ones(len(env.base_pos), dtype=torch.bool))
     # Level at 0.05: each point is 5 cm off.
     assert meter.errors()[0] == pytest.approx(0.05, abs=1e-6)
 
@@ -99,7 +102,7 @@ def test_the_level_map_lies_at_the_mean_height_of_the_feet_that_stand():
 def test_of_a_robot_in_the_air_all_feet_tell_the_level():
     env = _standing([[0.0, 0.0]], feet=[0.1, 0.1, 0.3, 0.3], down=[False] * 4)
     meter = HeightBaselines(env)
-    meter.update()
+    meter.update(torch.ones(len(env.base_pos), dtype=torch.bool))
     assert meter.errors()[0] == pytest.approx(0.2, abs=1e-6)
 
 
@@ -107,6 +110,14 @@ def test_the_mean_map_errs_by_what_heights_vary_about_their_means():
     # The first point is 2 cm off its mean in all, the second never.
     env = _standing([[0.02, 0.1], [0.06, 0.1]], feet=[0.0] * 4, down=[True] * 4)
     meter = HeightBaselines(env)
-    meter.update()
-    meter.update()
+    meter.update(torch.ones(len(env.base_pos), dtype=torch.bool))
+    meter.update(torch.ones(len(env.base_pos), dtype=torch.bool))
     assert meter.errors()[1] == pytest.approx((0.02**2 / 2) ** 0.5, abs=1e-6)
+
+
+def test_what_is_not_counted_changes_no_error():
+    env = _standing([[0.02, 0.1], [0.9, 0.5]], feet=[0.0] * 4, down=[True] * 4)
+    meter = HeightBaselines(env)
+    meter.update(torch.tensor([True, False]))
+    assert meter.errors()[0] == pytest.approx(((0.02**2 + 0.1**2) / 2) ** 0.5, abs=1e-6)
+    assert meter.errors()[1] == pytest.approx(0.0, abs=1e-6)

@@ -41,38 +41,32 @@ def test_estimation_errors_are_those_of_the_estimates_against_the_truth():
     assert errors.height_rmse == pytest.approx(torch.stack(heights).square().mean().sqrt())
 
 
-def _walked(phase_of_estimator, phase_of_clock, swings):
+def _walked(phase_of_estimator, swings, first_episodes=False, ended_at=None):
     """Return the errors where one foot swings for so many steps each time and stands for 10."""
     contact = []
     for swing in swings:
         contact += [True] * 10 + [False] * swing
     contact = torch.tensor([*contact, *[True] * 10, False, False])
-    columns = {
-        "base_lin_vel": slice(0, 3),
-        "heights": slice(3, 4),
-        "contact": slice(4, 8),
-        "phase": slice(8, 12),
-    }
-    feet = SimpleNamespace(min_steps=2, max_steps=50)
+    columns = {"base_lin_vel": slice(0, 3), "heights": slice(3, 4), "contact": slice(4, 8)}
     env = SimpleNamespace(
         num_envs=1,
         privileged_slices=columns,
         cfg=QuadrupedEnvCfg(),
-        footfalls=feet,
+        footfalls=SimpleNamespace(min_steps=2, max_steps=50),
         step_dt=0.02,
     )
     controller = SimpleNamespace(estimate=None)
-    meter = EstimationMeter(env, controller)  # type: ignore[arg-type]
+    meter = EstimationMeter(env, controller, first_episodes)  # type: ignore[arg-type]
     for step, down in enumerate(contact):
-        privileged = torch.zeros(1, 12)
+        privileged = torch.zeros(1, 8)
+        privileged[:, 0] = float(step)
         privileged[:, 4:8] = float(down)
-        privileged[:, 8:12] = phase_of_clock(step)
         controller.estimate = SimpleNamespace(
             base_lin_vel=torch.zeros(1, 3),
             heights=torch.zeros(1, 1),
             phase=torch.full((1, 4), phase_of_estimator(step)),
         )
-        meter({"privileged": privileged}, torch.zeros(1, dtype=torch.bool))  # type: ignore[arg-type]
+        meter({"privileged": privileged}, torch.tensor([step == ended_at]))  # type: ignore[arg-type]
     return meter.errors()
 
 
@@ -86,20 +80,25 @@ def _truth(swings):
 
 def test_who_knows_the_phase_of_even_swings_knows_the_time_of_contact():
     swings = (8, 8, 8)
-    errors = _walked(lambda step: _truth(swings)[step], lambda step: 0.5, swings)
+    errors = _walked(lambda step: _truth(swings)[step], swings)
     assert errors.phase_mae == pytest.approx(0.0, abs=1e-6)
     assert errors.contact_time_mae == pytest.approx(0.0, abs=1e-6)
-    # Half of a swing of 8 steps, told at each of them: off by 4, 3, 2, 1, 0, 1, 2, 3 steps.
-    assert errors.contact_time_mae_clock == pytest.approx(2.0 * 0.02)
-    assert errors.phase_mae_clock == pytest.approx(0.25, abs=0.01)
+    # Of the first swing the clock thinks that it takes 10 steps, as is usual; then it is right.
+    assert errors.contact_time_mae_clock == pytest.approx(0.02 * 8 * 2.0 / 24)
 
 
 def test_the_time_of_contact_is_measured_by_a_swing_of_mean_length():
     swings = (6, 12)
-    errors = _walked(lambda step: _truth(swings)[step], lambda step: 1.0, swings)
-    # Of 18 steps in the air a swing has 6 * 6 / 18 + 12 * 12 / 18 = 10 in the mean.
+    errors = _walked(lambda step: _truth(swings)[step], swings)
     left = [6 - step for step in range(6)] + [12 - step for step in range(12)]
-    told = [10.0 * (1.0 - s / 6) for s in range(6)] + [10.0 * (1.0 - s / 12) for s in range(12)]
+    told = [9.0 * (1.0 - s / 6) for s in range(6)] + [9.0 * (1.0 - s / 12) for s in range(12)]
     expected = sum(abs(a - b) for a, b in zip(left, told, strict=True)) / 18
     assert errors.contact_time_mae == pytest.approx(0.02 * expected)
-    assert errors.contact_time_mae_clock == pytest.approx(0.02 * sum(left) / 18)
+
+
+def test_what_comes_after_the_first_episode_is_left_out_where_that_is_asked_for():
+    whole, first = (_walked(lambda _: 0.5, (8, 8), only, ended_at=20) for only in (False, True))
+    # The velocity is off by the number of the step in one axis of three.
+    assert first.velocity_rmse == pytest.approx((sum(k * k for k in range(21)) / 21 / 3) ** 0.5)
+    assert whole.velocity_rmse > 1.5 * first.velocity_rmse
+    assert first.phase_known < whole.phase_known
