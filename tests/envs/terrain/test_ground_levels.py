@@ -5,6 +5,10 @@ from __future__ import annotations
 import pytest
 import torch
 
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.randomization import RandomizationCfg
+from mute.envs.terrain import BoxGround, TerrainCfg
 from mute.envs.terrain.levels import Travelled, next_levels
 
 
@@ -70,3 +74,28 @@ def test_how_far_a_robot_is_away_is_from_where_its_episode_began():
     other.load_state_dict(travelled.state_dict())
     other.update(there, torch.zeros(2, 4), torch.zeros(2, 3), 0.02)
     torch.testing.assert_close(other.away, torch.tensor([0.0, 2.0]))
+
+
+def test_levels_of_an_environment_follow_each_robot_as_its_episode_ends():
+    cfg = QuadrupedEnvCfg(
+        num_envs=4,
+        num_threads=1,
+        terrain=TerrainCfg(kind="stairs", first_levels=(2, 2)),
+        randomization=RandomizationCfg(enabled=False),
+    )
+    env = QuadrupedEnv(cfg)
+    env.reset()
+    ground = env.ground
+    assert isinstance(ground, BoxGround)
+    assert ground.level.tolist() == [2] * 4
+    env.set_command(torch.zeros(4))
+    env.step(torch.zeros(4, 12))
+    # One got away, one hardly walked, one was hardly asked to, and one is on its back by now.
+    env.travelled.start[0, 0] -= 5.0
+    env.travelled.made, env.travelled.asked = torch.tensor([[5.0, 1, 1, 2], [8.0, 8, 1, 2]])
+    env.simulation.qpos[3, 3:7] = torch.tensor([0.0, 1.0, 0.0, 0.0])
+    env.episode_length_buf[:3] = env.max_episode_length - 1
+    _, _, dones, _ = env.step(torch.zeros(4, 12))
+    assert bool(dones.all())
+    assert ground.level.tolist() == [3, 1, 2, 1]
+    assert not env.travelled.away.any()
