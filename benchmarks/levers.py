@@ -28,6 +28,7 @@ from mute.command_lines.arguments import (
     check_distinct,
     check_option,
     check_seed,
+    check_words,
     command_line,
     parse,
 )
@@ -163,11 +164,8 @@ def _figures(path: Path, content: Mapping[str, Any]) -> dict[str, Mapping[str, A
 
 
 def _check(args: LeversArgs) -> None:
-    check_distinct("levers", args.levers)
+    check_words("levers", args.levers, LEVERS)
     check_distinct("seeds", args.seeds)
-    for lever in args.levers:
-        if lever not in LEVERS:
-            raise MuteError(f"--levers must be of {', '.join(LEVERS)}, got {lever!r}")
     for seed in args.seeds:
         check_seed(seed)
     check_option("robots", args.robots, MANY_ROBOTS)

@@ -2,8 +2,8 @@
 
 The policy that ships walks on wood. The whole is what `evaluate.py noise` does. Of its parts are
 timed: to find landings and sliding in the physics, to make and measure the sound, and, for one
-robot, to have levels without sound. A walk of twice
-the length, in a process of its own as the first one, shows whether memory grows with it.
+robot, to have levels without sound. A walk of twice the length, in a process of its own as the
+first one, shows whether memory grows with it.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -29,6 +29,7 @@ __all__ = [
     "check_trials",
     "check_video",
     "check_wav",
+    "check_words",
     "command_line",
     "current_spelling",
     "is_given",
@@ -240,6 +241,23 @@ def check_distinct(option: str, values: Sequence[object]) -> None:
     repeated = next((value for value in values if values.count(value) > 1), None)
     if repeated is not None:
         raise MuteError(f"--{option} must name each but once, got {repeated} again")
+
+
+def check_words(option: str, words: Sequence[str], known: Iterable[str]) -> None:
+    """Check that an option with a list names some of what there is, each once.
+
+    Args:
+        option: Its name, without the dashes.
+        words: What was given.
+        known: What there is.
+
+    Raises:
+        MuteError: If it is empty, repeats itself, or names something else.
+    """
+    check_distinct(option, words)
+    unknown = next((word for word in words if word not in known), None)
+    if unknown is not None:
+        raise MuteError(f"--{option} must be of {', '.join(known)}, got {unknown!r}")
 
 
 def check_seed(seed: int) -> None:

@@ -15,9 +15,9 @@ from mute.acoustics.origin import sound_origin
 from mute.command_lines.arguments import (
     MANY_ROBOTS,
     Words,
-    check_distinct,
     check_option,
     check_seed,
+    check_words,
     make_directory,
 )
 from mute.command_lines.policy_options import PolicyArgs
@@ -28,7 +28,6 @@ from mute.evaluation.reliability.figures import Figure, PartResult, shown
 from mute.evaluation.reliability.parts import PARTS
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.usual_robots import under_conditions
-from mute.support.errors import MuteError
 from mute.support.plain_data import without_nan
 from mute.support.signals import exit_status
 
@@ -170,7 +169,4 @@ def _load(args: ReliabilityArgs) -> Policy:
 def _check(args: ReliabilityArgs) -> None:
     check_option("robots", args.robots, MANY_ROBOTS)
     check_seed(args.seed)
-    check_distinct("parts", args.parts)
-    unknown = [name for name in args.parts if name not in PARTS]
-    if unknown:
-        raise MuteError(f"--parts must be of {', '.join(PARTS)}, got {unknown[0]!r}")
+    check_words("parts", args.parts, PARTS)

@@ -20,6 +20,7 @@ from mute.command_lines.arguments import (
     check_distinct,
     check_option,
     check_seed,
+    check_words,
     make_directory,
 )
 from mute.command_lines.policy_options import PolicyArgs
@@ -31,7 +32,6 @@ from mute.envs.terrain.figures import LEVELS
 from mute.evaluation.crossing import cross, crossing_cfg
 from mute.evaluation.endurance import HARDSHIPS, LONGEST_PUSHES, be_pushed, bear, walk_at_random
 from mute.evaluation.tables import print_table, write_csv, write_json
-from mute.support.errors import MuteError
 from mute.support.plain_data import without_nan
 from mute.support.provenance import REPOSITORY, current_commit, file_sha256, machine_kind
 from mute.support.ranges import Range
@@ -104,7 +104,7 @@ def terrain(args: TerrainArgs) -> int:
     torch.set_num_threads(1)  # the physics engine has the cores
     tasks = [task for task in _tasks(args, policy) if task.part in args.parts]
     tables: dict[str, list[dict[str, Any]]] = {}
-    status, done, whole = 0, 0.0, 0
+    status, done = 0, 0.0
     try:
         with progress_bar("terrain", sum(task.seconds for task in tasks)) as bar:
 
@@ -114,12 +114,12 @@ def terrain(args: TerrainArgs) -> int:
                 bar(done)
 
             for task in tasks:
-                tables.setdefault(task.part, []).append(task.measure(advance))
-                whole += 1
+                row = task.measure(advance)
+                tables.setdefault(task.part, []).append(row)
     except KeyboardInterrupt as stop:
+        whole = sum(map(len, tables.values()))
         print(f"interrupted; measured: {whole} of {len(tasks)}", file=sys.stderr)
         status = exit_status(stop)
-    tables = {part: rows for part, rows in tables.items() if rows}
     if tables:
         about = {
             "policy": os.path.relpath(args.policy, REPOSITORY),
@@ -203,8 +203,8 @@ def _check(args: TerrainArgs) -> None:
     check_option("seconds", args.seconds, Range(1.0, LONGEST_WALK, above=True))
     check_option("minutes", args.minutes, Range(0.0, LONGEST_WALK / 60.0, above=True))
     check_seed(args.seed)
-    _check_words("parts", args.parts, _PARTS)
-    _check_words("kinds", args.kinds, tuple(KINDS))
+    check_words("parts", args.parts, _PARTS)
+    check_words("kinds", args.kinds, KINDS)
     check_distinct("levels", args.levels)
     for level in args.levels:
         check_option("levels", level, Range(0, LEVELS - 1, whole=True))
@@ -212,10 +212,3 @@ def _check(args: TerrainArgs) -> None:
     for speed in args.speed:
         check_option("speed", speed, Range(0.0, 2.0, above=True))
     check_option("beta", args.beta, Range(0.0, 1.0))
-
-
-def _check_words(option: str, words: tuple[str, ...], known: tuple[str, ...]) -> None:
-    check_distinct(option, words)
-    unknown = [word for word in words if word not in known]
-    if unknown:
-        raise MuteError(f"--{option} must be of {', '.join(known)}, got {unknown[0]!r}")

@@ -257,7 +257,8 @@ def test_the_exposure_of_tones_is_that_of_their_sound(speed):
 def test_a_joint_of_no_speed_at_all_is_no_error():
     # A simulation of somebody else's may blow up.
     for speed in (math.nan, math.inf, 1e6):
-        DriveExposure(1, RATE, SHARE).squares(_torques(np.full(20, 7.0), 2, joint_vel=speed))
+        block = _torques(np.full(20, 7.0), 2, joint_vel=speed)
+        assert DriveExposure(1, RATE, SHARE).squares(block).shape == (20, 1)
 
 
 @pytest.mark.parametrize("joint", [0, 2])
