@@ -62,5 +62,8 @@ class Motion:
     """Time since the last landing of the feet that landed, else 0, s. Shape: (num_envs, 4)."""
     swing_apex: torch.Tensor
     """Highest clearance of the current or last swing, m. Shape: (num_envs, 4)."""
+    ground_slope: torch.Tensor
+    """Rise of the ground from foot to foot, along the heading and to the left, m a metre.
+    Shape: (num_envs, 2)."""
     fallen: torch.Tensor
     """Robots whose episode this step ends by a fall, bool. Shape: (num_envs,)."""

@@ -38,6 +38,7 @@ from .step_log import curriculum_log, episode_log, gait_log, ground_log
 from .terrain import BoxGround, FlatGround, Ground, kind_of_robot, num_boxes
 from .terrain.draws import KEYS
 from .terrain.levels import Travelled, next_levels
+from .terrain.slope import slope_under
 
 __all__ = ["NUM_ACTIONS", "QuadrupedEnv"]
 
@@ -98,6 +99,7 @@ class QuadrupedEnv(VecEnv):
         """Points of the height map in the heading frame, m. Shape: (num_heights, 2)."""
         self.ground = self._make_ground()
         """The ground under the robots."""
+        self._command_steps = self._steps_of_commands()
         self.travelled = Travelled(cfg.num_envs, self.device)
         self.commands = CommandSampler(cfg.commands, cfg.num_envs, self.generator, self.device)
         self.footfalls = Footfalls(
@@ -292,7 +294,8 @@ class QuadrupedEnv(VecEnv):
         foot_pos = self._sensors.foot_pos
         points = torch.cat((foot_pos[:, :, :2], self.base_pos[:, None, :2]), dim=1)
         heights = self.ground.height(points)
-        clearance = foot_pos[:, :, 2] - FOOT_RADIUS - heights[:, : len(LEGS)]
+        under = heights[:, : len(LEGS)]
+        clearance = foot_pos[:, :, 2] - FOOT_RADIUS - under
         feet.update(clearance)
         joint_acc = (self.joint_vel - self.last_joint_vel) / self.step_dt
         self.last_joint_vel = self.joint_vel.clone()
@@ -325,13 +328,9 @@ class QuadrupedEnv(VecEnv):
             landing_speed=feet.landing_speed,
             stride_time=feet.stride_time,
             swing_apex=feet.swing_apex,
+            ground_slope=slope_under(foot_pos[:, :, :2], under, self.heading),
             fallen=self.fallen,
         )
-
-    def _clearance(self) -> torch.Tensor:
-        """Return the air between each foot and the ground, m. Shape: (num_envs, 4)."""
-        foot_pos = self._sensors.foot_pos
-        return foot_pos[:, :, 2] - FOOT_RADIUS - self.ground.height(foot_pos[:, :, :2])
 
     def _falls(self) -> torch.Tensor:
         """Return which robots fell; those of unstable simulations stand again already."""
@@ -359,8 +358,11 @@ class QuadrupedEnv(VecEnv):
     def _lift_to_ground(self, mask: torch.Tensor) -> None:
         """Put the lowest foot of each masked robot on the ground: joint noise would bury it."""
         self.simulation.forward(mask, "positions")
-        lowest = self._clearance().amin(dim=1)
-        self.simulation.qpos[:, 2] -= torch.where(mask, lowest, 0.0)
+        robots = torch.nonzero(mask)[:, 0]
+        feet = self._sensors.foot_pos[robots]
+        ground = self.ground.height_below(feet[:, :, :2], FOOT_RADIUS, robots)
+        lowest = (feet[:, :, 2] - FOOT_RADIUS - ground).amin(dim=1)
+        self.simulation.qpos[robots, 2] -= lowest
         self.simulation.forward(mask)
 
     def _renew_ground(self, mask: torch.Tensor) -> None:
@@ -376,22 +378,25 @@ class QuadrupedEnv(VecEnv):
         ground.lay(self.simulation.qpos[:, :2], mask)
 
     def _resample_and_push(self, dones: torch.Tensor) -> None:
-        due = self._due(self.cfg.commands.resampling_time) & ~dones
+        due = self._due(self._command_steps) & ~dones
         if bool(due.any()):
             self.commands.resample(due, False, self.curriculum.commands)
         cfg = self.cfg.randomization
         if not (cfg.enabled and cfg.push_interval > 0.0):
             return
-        due = self._due(cfg.push_interval)
+        due = self._due(self._steps(cfg.push_interval))
         if bool(due.any()):
             push = self._draw(self.num_envs, 2) * (cfg.push_velocity * due.unsqueeze(1))
             self.simulation.qvel[:, :2] += push
             self._read_state()  # the critic and the estimator's label know of the push
 
-    def _due(self, interval: float) -> torch.Tensor:
-        """Return in whose episode an interval (s) ends with this step. Shape: (num_envs,), bool."""
-        steps = max(1, round(interval / self.step_dt))
+    def _due(self, steps: int | torch.Tensor) -> torch.Tensor:
+        """Return in whose episode so many steps end with this one. Shape: (num_envs,), bool."""
         return (self.episode_length_buf % steps == 0) & (self.episode_length_buf > 0)
+
+    def _steps(self, interval: float) -> int:
+        """Return an interval, s, in control steps: one at least."""
+        return max(1, round(interval / self.step_dt))
 
     def _observe(self) -> None:
         ang_vel, gravity = self.base_ang_vel, self.projected_gravity
@@ -449,6 +454,15 @@ class QuadrupedEnv(VecEnv):
         unit = torch.rand(self.num_envs, generator=self.generator, device=self.device)
         ground.level = low + (unit * (high - low + 1)).long()
         return ground
+
+    def _steps_of_commands(self) -> torch.Tensor:
+        """Return for how many steps each robot has the same command. Shape: (num_envs,)."""
+        time = torch.full((self.num_envs,), self._steps(self.cfg.commands.resampling_time))
+        longer = self.cfg.terrain.command_time
+        if longer > 0.0:
+            for robot, kind in enumerate(kind_of_robot(self.cfg.terrain, self.num_envs)):
+                time[robot] = time[robot] if kind == "flat" else self._steps(longer)
+        return time.to(self.device)
 
     def _allocate(self) -> None:
         num_envs, device = self.num_envs, self.device

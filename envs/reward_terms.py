@@ -263,6 +263,18 @@ def orientation(motion: Motion) -> torch.Tensor:
 
 
 @register_term()
+def lean(motion: Motion) -> torch.Tensor:
+    """Penalise a trunk that is tilted against the ground under its feet: on the level, |g_xy|^2.
+
+    On stairs a trunk that follows them leans by nothing; not in the paper. Of ground that rises by
+    s a metre, along the heading and to the left, the level trunk has g_xy = -s / sqrt(1 + |s|^2).
+    """
+    slope = motion.ground_slope
+    along_ground = -slope / (1.0 + slope.square().sum(dim=1, keepdim=True)).sqrt()
+    return (motion.projected_gravity[:, :2] - along_ground).square().sum(dim=1)
+
+
+@register_term()
 def smoothness(motion: Motion) -> torch.Tensor:
     """Penalise the second difference of the actions: |a_t - 2 a_{t-1} + a_{t-2}|^2; DreamWaQ's."""
     second = motion.action - 2.0 * motion.last_action + motion.action_before_last

@@ -39,6 +39,9 @@ class TerrainCfg:
     """Whether robots that get ahead go on to higher levels, and others back to lower ones."""
     crossed: float = 4.0
     """Distance from its start that a robot gets in an episode to go up a level, m."""
+    command_time: float = 0.0
+    """Time between new velocity commands where ground has levels, s; with 0 it is that of all
+    commands. Commands that soon follow each other lead nowhere, and over nothing."""
 
     def __post_init__(self) -> None:
         """Check the fields.
@@ -62,6 +65,7 @@ class TerrainCfg:
 _RANGES = {
     "first_levels": Range(0, LEVELS - 1, whole=True),
     "crossed": Range(0.0, 1e6, above=True),
+    "command_time": Range(0.0, 1e12),
 }
 
 

@@ -29,15 +29,35 @@ class Ground(ABC):
     """Ground that has one height at every point."""
 
     @abstractmethod
-    def height(self, points: torch.Tensor) -> torch.Tensor:
+    def height(self, points: torch.Tensor, robots: torch.Tensor | None = None) -> torch.Tensor:
         """Return the ground height at world points, m.
 
         Args:
-            points: Of each robot. Shape: (num_envs, ..., 2).
+            points: Of each of n robots. Shape: (n, ..., 2).
+            robots: Which these are, by their indices; all of them, in order, by default.
+                Shape: (n,), int64.
 
         Returns:
-            Shape: (num_envs, ...).
+            Shape: (n, ...).
         """
+
+    def height_below(
+        self, feet: torch.Tensor, radius: float, robots: torch.Tensor | None = None
+    ) -> torch.Tensor:
+        """Return the height of the highest ground below spheres, m: over an edge, the upper side.
+
+        It is looked for in the corners of the square around each: of ground whose parts are wider.
+
+        Args:
+            feet: Centres in the world, m. Shape: (n, spheres, 2).
+            radius: Of all, m.
+            robots: Which n robots', see `height`.
+
+        Returns:
+            Shape: (n, spheres).
+        """
+        corners = feet[:, :, None] + radius * feet.new_tensor(_CORNERS)
+        return self.height(corners, robots).amax(dim=2)
 
     def heading(self, draw: torch.Tensor) -> torch.Tensor:
         """Return in which direction each robot begins, rad.
@@ -67,10 +87,13 @@ class Ground(ABC):
         return base_pos[:, 2:3] - self.height(base_pos[:, None, :2] + offset)
 
 
+_CORNERS = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
+
+
 class FlatGround(Ground):
     """An endless plane at height zero."""
 
-    def height(self, points: torch.Tensor) -> torch.Tensor:
+    def height(self, points: torch.Tensor, robots: torch.Tensor | None = None) -> torch.Tensor:
         """Return zero everywhere, see `Ground.height`."""
         return torch.zeros_like(points[..., 0])
 
@@ -116,13 +139,17 @@ class BoxGround(Ground):
         self._quat[:, self._boxes] = 0.0
         self._quat[:, self._boxes, 0] = 1.0
 
-    def height(self, points: torch.Tensor) -> torch.Tensor:
+    def height(self, points: torch.Tensor, robots: torch.Tensor | None = None) -> torch.Tensor:
         """Return the ground height at world points, m, see `Ground.height`."""
         flat = points.reshape(len(points), -1, 2)
         heights = torch.empty_like(flat[..., 0])
-        for name, robots in zip(self.kinds, self._robots, strict=True):
-            level, key = self.level[robots], self.key[robots]
-            heights[robots] = KINDS[name].height(flat[robots], level, key)
+        level, key = self.level, self.key
+        rows_of_kind = self._robots
+        if robots is not None:
+            level, key, kind = level[robots], key[robots], self.kind[robots]
+            rows_of_kind = [torch.nonzero(kind == index)[:, 0] for index in range(len(self.kinds))]
+        for name, rows in zip(self.kinds, rows_of_kind, strict=True):
+            heights[rows] = KINDS[name].height(flat[rows], level[rows], key[rows])
         return heights.reshape(points.shape[:-1])
 
     def heading(self, draw: torch.Tensor) -> torch.Tensor:

@@ -14,7 +14,7 @@ from mute.envs.terrain import FlatGround, Ground
 class _Slope(Ground):
     """Ground as high as the world's x, plus a hundred times its y."""
 
-    def height(self, points):
+    def height(self, points, robots=None):
         return points[..., 0] + 100.0 * points[..., 1]
 
 

@@ -59,6 +59,13 @@ CASES = {
     "collision": ({"collisions": [0.0, 3.0]}, [0.0, 3.0]),
     "base_height": ({"base_height": [0.2, 0.35]}, [0.01, 0.0025]),
     "orientation": ({"projected_gravity": [[0.3, -0.4, -0.86], [0, 0, -1.0]]}, [0.25, 0.0]),
+    "lean": (
+        {
+            "projected_gravity": [[0.3, -0.4, -0.86], [-0.6, 0.0, -0.8]],
+            "ground_slope": [[0.0, 0.0], [0.75, 0.0]],
+        },
+        [0.25, 0.0],  # on the level as `orientation`; along a slope of 3 to 4
+    ),
     "smoothness": (
         {
             "action": [[1.0], [2.0]],

@@ -29,6 +29,7 @@ WIDTHS = {
     "landing_speed": 4,
     "stride_time": 4,
     "swing_apex": 4,
+    "ground_slope": 2,
 }
 
 

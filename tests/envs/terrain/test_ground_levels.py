@@ -5,10 +5,11 @@ from __future__ import annotations
 import pytest
 import torch
 
+from mute.envs.commands import CommandsCfg
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
-from mute.envs.terrain import BoxGround, TerrainCfg
+from mute.envs.terrain import BoxGround, TerrainCfg, kind_of_robot
 from mute.envs.terrain.levels import Travelled, next_levels
 
 
@@ -99,3 +100,23 @@ def test_levels_of_an_environment_follow_each_robot_as_its_episode_ends():
     assert bool(dones.all())
     assert ground.level.tolist() == [3, 1, 2, 1]
     assert not env.travelled.away.any()
+
+
+def test_commands_hold_longer_where_ground_has_levels_if_they_are_told_to():
+    cfg = QuadrupedEnvCfg(
+        num_envs=6,
+        terrain=TerrainCfg(kind="indoor", command_time=0.1),
+        commands=CommandsCfg(resampling_time=0.04, standing_fraction=0.0),
+        randomization=RandomizationCfg(enabled=False),
+    )
+    env = QuadrupedEnv(cfg)
+    flat = torch.tensor([name == "flat" for name in kind_of_robot(cfg.terrain, 6)])
+    assert 0 < int(flat.sum()) < 6
+    changed = []
+    for _ in range(5):
+        before = env.commands.command[:, :3].clone()
+        env.step(torch.zeros(6, 12))
+        changed.append((env.commands.command[:, :3] != before).all(dim=1))
+    for robot in range(6):
+        at = [step + 1 for step, robots in enumerate(changed) if robots[robot]]
+        assert at == ([2, 4] if flat[robot] else [5])
