@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import torch
 
-__all__ = ["BaseState", "base_state"]
+__all__ = ["GRAVITY", "BaseState", "base_state", "specific_force"]
 
 
 class BaseState(NamedTuple):
@@ -22,6 +22,22 @@ class BaseState(NamedTuple):
     """Direction of gravity in the body frame. Shape: (num_envs, 3)."""
     heading: torch.Tensor
     """Unit vector of the trunk's x axis in the horizontal plane. Shape: (num_envs, 2)."""
+
+
+GRAVITY = 9.81
+"""Acceleration of free fall that the scene has, m/s^2."""
+
+
+def specific_force(qpos: torch.Tensor, acceleration: torch.Tensor) -> torch.Tensor:
+    """Return what an accelerometer in the trunk reads, m/s^2, in the body frame: at rest, upwards.
+
+    Args:
+        qpos: Generalised positions, those of the trunk's free joint first. Shape: (n, nq).
+        acceleration: Of the trunk in the world, m/s^2. Shape: (n, 3).
+    """
+    up = acceleration.new_tensor((0.0, 0.0, GRAVITY))
+    nowhere = torch.zeros_like(acceleration)
+    return base_state(qpos, torch.cat((acceleration + up, nowhere), dim=1)).lin_vel
 
 
 def base_state(qpos: torch.Tensor, qvel: torch.Tensor) -> BaseState:

@@ -24,6 +24,8 @@ _WRITTEN = ("qpos", "qvel", "ctrl")
 _READ = ("sensordata", "actuator_force")
 """Arrays that follow from the state."""
 
+_CTRL = int(mujoco.mjtState.mjSTATE_CTRL)
+
 _MANY_SHAPES = 8
 """Shapes of a body from which on it may pay to look first which of them are near."""
 
@@ -83,13 +85,19 @@ class BatchSimulation:
         self._recorded = tuple(dict.fromkeys((*self._recorded, *names)))
         self._records = {}
 
-    def step(self, num_steps: int = 1) -> None:
-        """Advance every simulation by a number of physics steps."""
+    def step(self, num_steps: int = 1, ctrl: torch.Tensor | None = None) -> None:
+        """Advance every simulation by a number of physics steps, see `Simulation.step`."""
         self._make_room(num_steps)
         with self._calling():
             # Unlike `Batch.step`, a rollout ends for a simulation that MuJoCo warns of.
             try:
-                self._batch.rollout(num_steps, record=self._recorded, out=self._records)
+                self._batch.rollout(
+                    num_steps,
+                    None if ctrl is None else ctrl.double().numpy(),
+                    _CTRL,
+                    record=self._recorded,
+                    out=self._records,
+                )
             except SimulationError as error:
                 for name, rows in self._records.items():
                     rows[error.ids] = self._batch.bind(name)[error.ids, np.newaxis]

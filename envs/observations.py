@@ -17,6 +17,7 @@ from .scene import LEGS
 __all__ = [
     "OBSERVATION_WIDTHS",
     "OBS_DIM",
+    "SENSOR_WIDTHS",
     "ObservationsCfg",
     "noise_amplitude",
     "policy_observation",
@@ -36,6 +37,10 @@ OBSERVATION_WIDTHS: dict[str, int] = {
 """Parts of the policy's observation, in order (paper, eq. 7)."""
 
 OBS_DIM = sum(OBSERVATION_WIDTHS.values())
+
+SENSOR_WIDTHS: dict[str, int] = {"specific_force": 3, "foot_contact": len(LEGS)}
+"""Parts of what else a robot measures, in order: what its accelerometer reads, m/s^2, in the body
+frame, mean over the control step; and the share of it in which each foot pressed on something."""
 
 
 @dataclass
@@ -64,6 +69,11 @@ class ObservationsCfg:
     """Half width of the uniform noise on each part, before scaling: rad/s, 1, rad, rad/s."""
     noise_level: float = 1.0
     """Factor on all noise; 0 switches it off."""
+    sensors: bool = False
+    """Whether there is a group `sensors` of what else a robot measures, `SENSOR_WIDTHS`, which no
+    policy uses, but a controller that keeps track of its place."""
+    accelerometer_noise: float = 0.2
+    """Half width of the uniform noise on the mean of its readings over a control step, m/s^2."""
 
     def __post_init__(self) -> None:
         """Check the names and the values.
@@ -87,6 +97,8 @@ class ObservationsCfg:
         for name, value in self.noise.items():
             check_number(f"env.observations.noise.{name}", value, Range(0.0, 1e6))
         check_number("env.observations.noise_level", self.noise_level, Range(0.0, 1e6))
+        noise = self.accelerometer_noise
+        check_number("env.observations.accelerometer_noise", noise, Range(0.0, 1e6))
 
 
 def privileged_widths(num_heights: int) -> dict[str, int]:

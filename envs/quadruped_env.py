@@ -15,7 +15,7 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from .base_state import base_state
+from .base_state import base_state, specific_force
 from .commands import CommandSampler
 from .curriculum import Curriculum, curriculum
 from .engines import make_simulation
@@ -128,7 +128,9 @@ class QuadrupedEnv(VecEnv):
         """Advance every robot by one control step; with `autoreset`, finished ones begin anew.
 
         Args:
-            actions: Joint offsets over `action_scale`. Shape: (num_envs, 12).
+            actions: Joint offsets over `action_scale`, for all of the step, shape (num_envs, 12),
+                or for each of its physics steps, shape (num_envs, decimation, 12); the last of
+                these is then the action that is rewarded and observed.
 
         Returns:
             Observations after resets, rewards (num_envs,), dones (num_envs,), and `extras` with
@@ -213,6 +215,8 @@ class QuadrupedEnv(VecEnv):
         state["travelled"] = self.travelled.state_dict()
         if isinstance(self.ground, BoxGround):
             state["ground"] = self.ground.state_dict()
+        if self.cfg.observations.sensors:
+            state |= {name: getattr(self, name).clone() for name in _SENSED}
         state["encoder_offset"] = self.encoder_offset.clone()
         state["imu"] = None if self.imu is None else self.imu.clone()
         state["observations"] = {key: value.clone() for key, value in self._observations.items()}
@@ -226,6 +230,8 @@ class QuadrupedEnv(VecEnv):
         """
         self.simulation.load_state_dict(state["simulation"])
         for name in _STATE_TENSORS:
+            setattr(self, name, state[name].to(self.device, copy=True))
+        for name in _SENSED if self.cfg.observations.sensors else ():
             setattr(self, name, state[name].to(self.device, copy=True))
         self.step_count = state["step_count"]
         self.unstable_count = state["unstable_count"]
@@ -255,23 +261,32 @@ class QuadrupedEnv(VecEnv):
     def _take_action(self, actions: torch.Tensor) -> None:
         clip = self.cfg.action_clip
         self.action_before_last, self.last_action = self.last_action, self.action
-        self.invalid_action = ~actions.isfinite().all(dim=1)
+        self.invalid_action = ~actions.isfinite().flatten(1).all(dim=1)
         # NaN would pass a clamp and reach the engine.
-        self.action = torch.nan_to_num(actions).clamp(-clip, clip)
+        self._actions = torch.nan_to_num(actions).clamp(-clip, clip)
+        self.action = self._actions if actions.dim() == 2 else self._actions[:, -1]
 
     def _advance(self) -> None:
         """Run the physics of one control step and record the feet at every physics step."""
         simulation = self.simulation
-        torch.add(self.stand, self.action, alpha=self.cfg.action_scale, out=simulation.ctrl)
         # Motors hold what their encoders read, which is the joint's position and the offset.
-        simulation.ctrl -= self.encoder_offset
+        exact = self.stand - self.encoder_offset
+        torch.add(exact, self.action, alpha=self.cfg.action_scale, out=simulation.ctrl)
         if isinstance(self.ground, BoxGround):
             self.ground.lay(simulation.qpos[:, :2])
-        simulation.step(self.cfg.decimation)
+        if self.cfg.observations.sensors:
+            self._lin_vel_before = simulation.qvel[:, :3].clone()
+        ctrl = None
+        if self._actions.dim() == 3:
+            ctrl = exact[:, None] + self.cfg.action_scale * self._actions
+        simulation.step(self.cfg.decimation, ctrl)
         for listener in self.physics_listeners:
             listener()
         sensors = self._sensors
-        self.footfalls.record(sensors.foot_vel_z_substeps, sensors.foot_contact_substeps)
+        contact = sensors.foot_contact_substeps
+        self.footfalls.record(sensors.foot_vel_z_substeps, contact)
+        if self.cfg.observations.sensors:
+            self._contact_share = (contact > 0.0).float().mean(dim=0)
         self.unstable = simulation.unstable()
         if bool(self.unstable.any()):
             # Reset before anything is read, so that no NaN reaches a reward or an average.
@@ -353,6 +368,10 @@ class QuadrupedEnv(VecEnv):
         for name in _PAST:
             setattr(self, name, getattr(self, name).masked_fill(mask.unsqueeze(1), 0.0))
         self.episode_length_buf = self.episode_length_buf.masked_fill(mask, 0)
+        begun = self.simulation.qvel[:, :3]
+        self._lin_vel_before = torch.where(mask[:, None], begun, self._lin_vel_before)
+        contact = (self._sensors.foot_contact > 0.0).float()
+        self._contact_share = torch.where(mask[:, None], contact, self._contact_share)
         self._read_state()
 
     def _lift_to_ground(self, mask: torch.Tensor) -> None:
@@ -420,9 +439,20 @@ class QuadrupedEnv(VecEnv):
         privileged = privileged_observation(
             self.base_lin_vel, heights, feet.raw_contact, feet.phase, self.physics
         )
-        self._observations = TensorDict(
-            {"policy": policy, "privileged": privileged}, batch_size=[self.num_envs]
-        )
+        groups = {"policy": policy, "privileged": privileged}
+        if self.cfg.observations.sensors:
+            groups["sensors"] = self._sensor_observation()
+        self._observations = TensorDict(groups, batch_size=[self.num_envs])
+
+    def _sensor_observation(self) -> torch.Tensor:
+        observations = self.cfg.observations
+        change = self.simulation.qvel[:, :3] - self._lin_vel_before
+        force = specific_force(self.simulation.qpos, change / self.step_dt)
+        if self.imu is not None:
+            force = (self.imu * force[:, None]).sum(dim=2)
+        noise = observations.noise_level * observations.accelerometer_noise
+        force = force + noise * self._draw(self.num_envs, 3)
+        return torch.cat((force, self._contact_share), dim=1)
 
     def _log(
         self, shares: dict[str, torch.Tensor], factors: Curriculum, dones: torch.Tensor
@@ -478,6 +508,8 @@ class QuadrupedEnv(VecEnv):
         """Robots whose action in it held NaN, taken for 0, or infinity, taken for the clip.
         Shape: (num_envs,), bool."""
         self.power = torch.zeros(num_envs, device=device)
+        self._lin_vel_before = torch.zeros(num_envs, 3, device=device)
+        self._contact_share = torch.zeros(num_envs, len(LEGS), device=device)
         self.step_count = 0
         self.unstable_count = 0
         self._estimated_phase = torch.zeros(num_envs, len(LEGS), device=device)
@@ -495,4 +527,5 @@ def scene_of(cfg: QuadrupedEnvCfg) -> SceneCfg:
 
 
 _PAST = ("action", "last_action", "action_before_last", "last_joint_vel")
+_SENSED = ("_lin_vel_before", "_contact_share")
 _STATE_TENSORS = (*_PAST, "episode_length_buf", "_estimated_phase", "physics")

@@ -266,12 +266,17 @@ def orientation(motion: Motion) -> torch.Tensor:
 def lean(motion: Motion) -> torch.Tensor:
     """Penalise a trunk that is tilted against the ground under its feet: on the level, |g_xy|^2.
 
-    On stairs a trunk that follows them leans by nothing; not in the paper. Of ground that rises by
-    s a metre, along the heading and to the left, the level trunk has g_xy = -s / sqrt(1 + |s|^2).
+    On stairs a trunk that follows them leans by nothing; not in the paper. Along ground that rises
+    by s_x a metre along the heading and s_y to the left, gravity in the body frame is
+    -s_x / sqrt(1 + s_x^2) and -s_y / (sqrt(1 + s_x^2) sqrt(1 + |s|^2)).
     """
-    slope = motion.ground_slope
-    along_ground = -slope / (1.0 + slope.square().sum(dim=1, keepdim=True)).sqrt()
-    return (motion.projected_gravity[:, :2] - along_ground).square().sum(dim=1)
+    ahead, left = motion.ground_slope.unbind(dim=1)
+    steep = 1.0 / (1.0 + ahead.square()).sqrt()
+    gravity_x = -ahead * steep
+    gravity_y = -left * steep / (1.0 + ahead.square() + left.square()).sqrt()
+    away_x = motion.projected_gravity[:, 0] - gravity_x
+    away_y = motion.projected_gravity[:, 1] - gravity_y
+    return away_x.square() + away_y.square()
 
 
 @register_term()

@@ -72,8 +72,14 @@ class Simulation(Protocol):
         """
         ...
 
-    def step(self, num_steps: int = 1) -> None:
-        """Advance every simulation by a number of physics steps."""
+    def step(self, num_steps: int = 1, ctrl: torch.Tensor | None = None) -> None:
+        """Advance every simulation by a number of physics steps.
+
+        Args:
+            num_steps: How many.
+            ctrl: Set points for each of them, in place of the ones that hold.
+                Shape: (num_envs, num_steps, nu).
+        """
         ...
 
     def forward(self, mask: torch.Tensor | None = None, stage: Stage = "all") -> None:

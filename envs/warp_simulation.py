@@ -97,10 +97,12 @@ class WarpSimulation:
         self._recorded = tuple(dict.fromkeys((*self._recorded, *names)))
         self.substeps = {}
 
-    def step(self, num_steps: int = 1) -> None:
-        """Advance every simulation by a number of physics steps."""
+    def step(self, num_steps: int = 1, ctrl: torch.Tensor | None = None) -> None:
+        """Advance every simulation by a number of physics steps, see `Simulation.step`."""
         self._make_room(num_steps)
         for index in range(num_steps):
+            if ctrl is not None:
+                self.ctrl.copy_(ctrl[:, index])
             self._run(self._engine.step)
             for name, rows in self.substeps.items():
                 rows[:, index] = self._state[name]

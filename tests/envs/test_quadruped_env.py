@@ -9,7 +9,7 @@ import torch
 
 from mute.envs.commands import CommandsCfg
 from mute.envs.height_map import HeightMapCfg
-from mute.envs.observations import OBSERVATION_WIDTHS, ObservationsCfg, slices
+from mute.envs.observations import OBSERVATION_WIDTHS, SENSOR_WIDTHS, ObservationsCfg, slices
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
@@ -640,3 +640,68 @@ def test_the_true_phase_that_a_step_is_rewarded_by_is_that_of_the_observation_ac
 def test_a_bad_field_is_refused_by_name(field, value):
     with pytest.raises(ValueError, match=f"env.{field}"):
         QuadrupedEnvCfg(**{field: value})
+
+
+def test_an_action_for_each_physics_step_is_taken_in_it():
+    one, each = _make_env(2, **CALM), _make_env(2, **CALM)
+    for step in range(5):
+        action = _actions(2, step)
+        one.step(action)
+        each.step(action[:, None].expand(-1, one.cfg.decimation, -1))
+    assert torch.equal(one.simulation.qpos, each.simulation.qpos)
+    actions = torch.stack([_actions(2, step) for step in range(4)], dim=1)
+    each.step(actions)
+    one.step(actions[:, -1])
+    assert not torch.equal(one.simulation.qpos, each.simulation.qpos)
+    assert torch.equal(each.action, actions[:, -1])
+    columns = POLICY["last_action"]
+    assert torch.equal(each.get_observations()["policy"][:, columns], actions[:, -1])
+
+
+def test_sensors_read_weight_and_contact_at_rest_and_a_push_as_acceleration():
+    cfg = ObservationsCfg(noise_level=0.0, sensors=True)
+    env = _make_env(2, **(CALM | {"observations": cfg}))
+    columns = slices(SENSOR_WIDTHS)
+
+    def sensed(name):
+        return env.get_observations()["sensors"][:, columns[name]]
+
+    _stand_still(env, 100)
+    gravity = env.projected_gravity
+    torch.testing.assert_close(sensed("specific_force"), -9.81 * gravity, rtol=0.0, atol=0.05)
+    assert torch.equal(sensed("foot_contact"), torch.ones(2, 4))
+    assert "sensors" not in _make_env(2, **CALM).get_observations()
+    env.simulation.qvel[:, 2] += 3.0
+    _stand_still(env)
+    assert (sensed("foot_contact") < 1.0).any()
+    _stand_still(env, 5)  # flies
+    assert torch.equal(sensed("foot_contact"), torch.zeros(2, 4))
+    assert float(sensed("specific_force").norm(dim=1).max()) < 1.0
+
+
+def test_a_tilted_sensor_reads_gravity_alike_as_acceleration_and_as_its_direction():
+    robots = RandomizationCfg(imu_tilt=(0.1, 0.1), push_interval=0.0)
+    observations = ObservationsCfg(noise_level=0.0, sensors=True)
+    env = _make_env(2, **(CALM | {"observations": observations, "randomization": robots}))
+    _stand_still(env, 100)
+    seen = env.get_observations()
+    gravity = seen["policy"][:, POLICY["projected_gravity"]]
+    force = seen["sensors"][:, slices(SENSOR_WIDTHS)["specific_force"]]
+    torch.testing.assert_close(force, -9.81 * gravity, rtol=0.0, atol=0.05)
+    assert float((gravity - env.projected_gravity).abs().max()) > 0.05
+
+
+def test_what_sensors_read_survives_a_state_and_begins_anew_with_an_episode():
+    cfg = ObservationsCfg(noise_level=0.0, sensors=True)
+    env, twin = (_make_env(2, seed=seed, **QUIET | {"observations": cfg}) for seed in (1, 2))
+    _roll(env, 7)
+    twin.load_state_dict(env.state_dict())
+    command = torch.tensor([0.3, 0.0, 0.0, 0.0])
+    for each in (env, twin):
+        each.set_command(command)  # makes the observations anew
+    read = env.get_observations()["sensors"]
+    assert torch.equal(twin.get_observations()["sensors"], read)
+    env.reset(torch.tensor([True, False]))
+    fresh = env.get_observations()["sensors"]
+    assert float(fresh[0, :3].norm()) == pytest.approx(9.81, abs=1e-3)
+    assert torch.equal(fresh[1], read[1])

@@ -422,3 +422,20 @@ def test_a_field_of_a_model_with_other_shapes_is_refused_and_nothing_is_written(
         f"this model needs {own}"
     )
     assert torch.equal(simulation.field("body_mass"), before)
+
+
+def test_set_points_of_each_physics_step_are_those_of_as_many_steps(make_standing):
+    simulation, other = make_standing(2), make_standing(2)
+    simulation.record("qpos")
+    generator = torch.Generator().manual_seed(0)
+    ctrl = simulation.ctrl[:, None] + 0.3 * torch.rand(2, 4, 12, generator=generator)
+    simulation.step(4, ctrl)
+    for step in range(4):
+        other.ctrl[:] = ctrl[:, step]
+        other.step()
+    assert torch.equal(simulation.qpos, other.qpos)
+    assert torch.equal(simulation.ctrl, ctrl[:, -1])
+    assert torch.equal(simulation.substeps["qpos"][:, -1].float(), simulation.qpos)
+    simulation.step()  # the last ones hold
+    other.step()
+    assert torch.equal(simulation.qpos, other.qpos)

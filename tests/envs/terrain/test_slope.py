@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 import torch
 
@@ -39,6 +40,18 @@ def test_a_step_between_the_feet_counts_by_how_far_they_are_apart():
 def test_feet_in_one_place_have_no_slope():
     slope = slope_under(torch.zeros(1, 4, 2), torch.rand(1, 4), torch.tensor([[1.0, 0.0]]))
     assert torch.equal(slope, torch.zeros(1, 2))
+
+
+def test_a_trunk_along_a_diagonal_slope_does_not_lean():
+    slope = np.array([0.6, 0.5])
+    x = np.array([1.0, 0.0, slope[0]]) / np.hypot(1.0, slope[0])
+    normal = np.array([-slope[0], -slope[1], 1.0])
+    normal /= np.linalg.norm(normal)
+    gravity = [-x[2], -np.cross(normal, x)[2], -normal[2]]
+    motion = make_motion(projected_gravity=[gravity] * 2, ground_slope=[slope, [0.0, 0.0]])
+    leaning = REWARD_FUNCTIONS["lean"].function(motion)
+    assert float(leaning[0]) == pytest.approx(0.0, abs=1e-9)
+    assert float(leaning[1]) > 0.1
 
 
 @pytest.mark.parametrize(("pitch", "roll"), [(-0.3, 0.0), (0.2, 0.0), (0.0, 0.25)])
