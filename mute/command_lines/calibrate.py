@@ -41,8 +41,7 @@ from mute.command_lines.sound_options import (
     progress_bar,
     warn_if_not_known_well,
 )
-from mute.controllers import LearnedController
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.evaluation.intervals import mean_with_interval
 from mute.evaluation.noise_levels import SETTLE_TIME
 from mute.evaluation.paper_levels import PAPER_LEVELS
@@ -121,7 +120,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def provenance(args: CalibrationArgs, policy: Policy) -> dict[str, Any]:
+def provenance(args: CalibrationArgs, policy: Driver) -> dict[str, Any]:
     """Return where a calibration comes from, as plain data; paths are the repository's."""
     options = {
         "policy": os.path.relpath(args.policy, REPOSITORY),
@@ -168,7 +167,7 @@ def fit_share(mnl: Callable[[float], float], target: float) -> float:
     return 10.0 ** (float(decibels) / 20.0)  # pyright: ignore[reportArgumentType]
 
 
-def _fitted(args: CalibrationArgs, policy: Policy, target: float) -> dict[str, Any]:
+def _fitted(args: CalibrationArgs, policy: Driver, target: float) -> dict[str, Any]:
     """Return what was fitted, and the levels that come of it."""
     robot, rest = _walk(args, policy)
 
@@ -195,7 +194,7 @@ def _fitted(args: CalibrationArgs, policy: Policy, target: float) -> dict[str, A
     }
 
 
-def _walk(args: CalibrationArgs, policy: Policy) -> tuple[NDArray, NDArray]:
+def _walk(args: CalibrationArgs, policy: Driver) -> tuple[NDArray, NDArray]:
     """Return what the robots sound of with all of the force in the shell, and all else, Pa.
 
     Of robots that fall nothing is taken. Shapes: (robots, samples).
@@ -233,7 +232,7 @@ def _walk(args: CalibrationArgs, policy: Policy) -> tuple[NDArray, NDArray]:
     command = torch.tensor((args.speed, 0.0, 0.0, 0.0))
     torch.set_num_threads(1)  # the physics engine has the cores
     with progress_bar("walk", steps) as advance:
-        controller = LearnedController(policy, args.trials)
+        controller = policy.controller(env.cfg)
         run_trial(env, controller, command, steps, lambda _, dones: listen(advance, dones))
     if not stood.any():
         raise MuteError(f"{args.policy} falls on {args.floor}: it cannot be the reference")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,9 @@ from mute.command_lines.arguments import (
     check_seed,
     check_trials,
 )
-from mute.command_lines.policy_options import PolicyArgs
+from mute.command_lines.policy_options import DriverArgs
 from mute.controllers import LearnedController, load_policy
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.envs.commands import BETA, CommandSampler
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.estimation_errors import EstimationMeter
@@ -29,7 +28,7 @@ from mute.evaluation.progress import Milestone, checkpoints_of, training_minutes
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.trials import command_sampler, evaluation_cfg, run_trial
 from mute.evaluation.usual_robots import under_conditions
-from mute.support.provenance import REPOSITORY, file_sha256, machine_kind
+from mute.support.provenance import machine_kind
 from mute.support.ranges import Range
 
 __all__ = ["GaitArgs", "ProgressArgs", "gait", "progress"]
@@ -38,7 +37,7 @@ _SWEEP_ROBOTS = 300
 
 
 @dataclass
-class GaitArgs(PolicyArgs):
+class GaitArgs(DriverArgs):
     """Walk over the command range, and at one actual speed for several betas."""
 
     trials: int = 256
@@ -90,7 +89,7 @@ def progress(args: ProgressArgs) -> None:
         env = _environment(policy, args.trials, args.seconds, args.seed, args.randomized)
         draw = _draw_commands(env, args.seed)
         steps = round(args.seconds / env.step_dt)
-        meter = run_trial(env, LearnedController(policy, env.num_envs), draw.command, steps)
+        meter = run_trial(env, policy.controller(env.cfg), draw.command, steps)
         error, falls = meter.gait().velocity_error_sq, meter.gait().fall_rate
         trained = policy.cfg.env.num_envs * policy.cfg.agent.num_steps_per_env
         milestone = Milestone(
@@ -122,14 +121,16 @@ def progress(args: ProgressArgs) -> None:
 def gait(args: GaitArgs) -> None:
     """Measure a policy over the command range and at one speed."""
     _check(args)
-    args = args.with_policy_found()
+    args = args.with_driver_found()
+    origin = args.driver_origin()
     torch.set_num_threads(1)  # the physics engine has the cores
-    policy = load_policy(args.policy)
+    policy = args.driver()
     over_range = [_over_range(args, policy, beta) for beta in track(args.beta, "command range")]
     at_speed = _at_speed(args, policy)
     columns = ["beta", "fall_rate", "velocity_error_sq", "yaw_rate_error_sq"]
     columns += ["landing_speed_mean", "apex_mean", "power"]
-    columns += ["velocity_rmse", "height_rmse", "phase_mae"]
+    if "phase_mae" in over_range[0]:  # what drives it has an estimator
+        columns += ["velocity_rmse", "height_rmse", "phase_mae"]
     print_table(f"{args.trials} trials of {args.seconds:g} s over the range", over_range, columns)
     columns = ["beta", "landing_speed_mean", "landing_speed_rms", "apex_mean", "duty_factor"]
     columns += ["stride_frequency", "power"]
@@ -137,8 +138,7 @@ def gait(args: GaitArgs) -> None:
     write_csv(args.out / "gait_range.csv", over_range)
     write_csv(args.out / "gait_at_speed.csv", at_speed)
     summary = {
-        "policy": os.path.relpath(args.policy, REPOSITORY),
-        "policy_sha256": file_sha256(args.policy),
+        **origin,
         "trained_seed": policy.cfg.env.seed,
         "iteration": policy.iteration,
         "trials": args.trials,
@@ -154,29 +154,31 @@ def gait(args: GaitArgs) -> None:
     print(f"written: {args.out}/gait.json, gait_range.csv, gait_at_speed.csv")
 
 
-def _over_range(args: GaitArgs, policy: Policy, beta: float) -> dict[str, Any]:
+def _over_range(args: GaitArgs, policy: Driver, beta: float) -> dict[str, Any]:
     """Return the figures of one beta over the task's whole command range."""
     env = _environment(policy, args.trials, args.seconds, args.seed, args.randomized)
     draw = _draw_commands(env, args.seed)
     draw.command[:, BETA] = beta
-    controller = LearnedController(policy, env.num_envs)
-    estimation = EstimationMeter(env, controller)
+    controller = policy.controller(env.cfg)
     steps = round(args.seconds / env.step_dt)
+    if not isinstance(controller, LearnedController):
+        return {"beta": beta} | run_trial(env, controller, draw.command, steps).gait().as_dict()
+    estimation = EstimationMeter(env, controller)
     meter = run_trial(env, controller, draw.command, steps, estimation)
     return {"beta": beta} | meter.gait().as_dict() | estimation.errors().as_dict()
 
 
-def _at_speed(args: GaitArgs, policy: Policy) -> list[dict[str, float]]:
+def _at_speed(args: GaitArgs, policy: Driver) -> list[dict[str, float]]:
     robots = max(_SWEEP_ROBOTS, 12 * len(args.beta))
     env = _environment(policy, robots, args.seconds, args.seed, args.randomized)
     # All walk straight ahead, from the stance: only speed and beta differ.
-    controller = LearnedController(policy, robots)
+    controller = policy.controller(env.cfg)
     steps = round(args.seconds / env.step_dt)
     return sweep_beta_at_speed(env, controller, args.speed, args.beta, steps)
 
 
 def _environment(
-    policy: Policy, num_envs: int, seconds: float, seed: int, randomized: bool
+    policy: Driver, num_envs: int, seconds: float, seed: int, randomized: bool
 ) -> QuadrupedEnv:
     cfg = evaluation_cfg(policy.cfg.env, num_envs, seconds, seed, randomized)
     return QuadrupedEnv(cfg)

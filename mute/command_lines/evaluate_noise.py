@@ -14,7 +14,6 @@ import torch
 import tyro
 
 from mute.acoustics.floors import FLOORS
-from mute.acoustics.origin import sound_origin
 from mute.command_lines.arguments import (
     Numbers,
     Words,
@@ -31,7 +30,6 @@ from mute.command_lines.sound_options import (
     SoundArgs,
     find_microphone,
     find_room,
-    load_audible_policy,
     progress_bar,
     tell,
     tell_kept,
@@ -189,8 +187,8 @@ def _run(
         KeptWalks(wav, video, tell)
         for wav, video in zip(_files(args.wav, labels), _files(args.video, labels), strict=True)
     ]
-    args = args.with_policy_found()
-    origin = sound_origin(args.policy)
+    args = args.with_driver_found()
+    origin = args.origin()
     rows: list[NoiseRow] = []
     try:
         _measure(name, args, surfaces, settings, kept, rows)
@@ -220,7 +218,7 @@ def _measure(
         kept: For each floor what to keep of settings, by their index.
         rows: Is given the rows of each floor.
     """
-    policy = load_audible_policy(args.policy)
+    policy = args.audible_driver()
     microphone, room = find_microphone(args.microphone), find_room(args.room)
     make_directory(args.out)
     torch.set_num_threads(1)  # the physics engine has the cores

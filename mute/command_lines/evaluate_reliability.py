@@ -11,7 +11,6 @@ from typing import Any
 
 import torch
 
-from mute.acoustics.origin import sound_origin
 from mute.command_lines.arguments import (
     MANY_ROBOTS,
     Words,
@@ -20,10 +19,9 @@ from mute.command_lines.arguments import (
     check_words,
     make_directory,
 )
-from mute.command_lines.policy_options import PolicyArgs
-from mute.command_lines.sound_options import load_audible_policy, progress_bar
-from mute.controllers import load_policy
-from mute.controllers.learned import Policy
+from mute.command_lines.policy_options import DriverArgs
+from mute.command_lines.sound_options import check_audible, progress_bar
+from mute.controllers.driver import Driver
 from mute.evaluation.reliability.figures import Figure, PartResult, shown
 from mute.evaluation.reliability.parts import PARTS
 from mute.evaluation.tables import print_table, write_csv, write_json
@@ -38,7 +36,7 @@ _NOT_MET = 1
 
 
 @dataclass
-class ReliabilityArgs(PolicyArgs):
+class ReliabilityArgs(DriverArgs):
     """Whether a walk starts, follows, stands in silence and heeds beta, beside what it should."""
 
     robots: int = 256
@@ -77,10 +75,11 @@ def reliability(args: ReliabilityArgs) -> int:
         MuteError: If an argument is bad, or the policy cannot be used.
     """
     _check(args)
-    args = args.with_policy_found()
+    args = args.with_driver_found()
+    origin = args.origin()
     policy = _load(args)
     about = {
-        **sound_origin(args.policy),
+        **origin,
         "task": policy.task,
         "trained_seed": policy.cfg.env.seed,
         "iteration": policy.iteration,
@@ -102,7 +101,7 @@ def reliability(args: ReliabilityArgs) -> int:
     return status or (_NOT_MET if args.check and not met else 0)
 
 
-def _measure(args: ReliabilityArgs, policy: Policy, measured: _Measured) -> None:
+def _measure(args: ReliabilityArgs, policy: Driver, measured: _Measured) -> None:
     """Measure one part after the other."""
     parts = {name: part for name, part in PARTS.items() if name in args.parts}
     done = 0.0
@@ -160,10 +159,12 @@ def _print_starts(measured: _Measured) -> None:
         print_table("robots that go within 2 s, from a stand", listed, list(listed[0]))
 
 
-def _load(args: ReliabilityArgs) -> Policy:
+def _load(args: ReliabilityArgs) -> Driver:
     """Return the policy, which some parts need to be one that can be heard."""
-    heard = any(PARTS[name].heard for name in args.parts)
-    return load_audible_policy(args.policy) if heard else load_policy(args.policy)
+    driver = args.driver()
+    if any(PARTS[name].heard for name in args.parts):
+        check_audible(driver, args.driver_name)
+    return driver
 
 
 def _check(args: ReliabilityArgs) -> None:

@@ -12,7 +12,6 @@ from typing import Any
 
 import torch
 
-from mute.acoustics.origin import sound_origin
 from mute.command_lines.arguments import (
     check_betas,
     check_option,
@@ -25,14 +24,12 @@ from mute.command_lines.sound_options import (
     SoundArgs,
     find_microphone,
     find_room,
-    load_audible_policy,
     progress_bar,
     tell,
     tell_kept,
     warn_if_not_known_well,
 )
-from mute.controllers import LearnedController
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.evaluation.course.course import Course, load_course
 from mute.evaluation.course.long_walk import Walk, follow_course, make_walk_env
 from mute.evaluation.intervals import mean_with_interval, with_interval
@@ -86,12 +83,12 @@ def walk(args: WalkArgs) -> None:
     check_wav(args.wav)
     check_video(args.video)
     args.check_sound(args.wav or args.video)
-    args = args.with_policy_found()
     check_matplotlib()
-    course, policy = load_course(args.course), load_audible_policy(args.policy)
+    args = args.with_driver_found()
+    origin = args.origin()
+    course, policy = load_course(args.course), args.audible_driver()
     make_directory(args.out)  # now: a walk is long, and must not be in vain
     torch.set_num_threads(1)
-    origin = sound_origin(args.policy)
     keep = _kept_walk(args)
     walked = _walked(args, course, policy, keep, nominal=False)
     stopped = len(walked) < args.trials
@@ -103,7 +100,7 @@ def walk(args: WalkArgs) -> None:
 
 
 def _walked(
-    args: WalkArgs, course: Course, policy: Policy, keep: KeptWalks | None, nominal: bool
+    args: WalkArgs, course: Course, policy: Driver, keep: KeptWalks | None, nominal: bool
 ) -> list[Walk]:
     """Let robots walk side by side, or the exact one alone; return what came of those that ended.
 
@@ -119,7 +116,7 @@ def _walked(
     with progress_bar("walk, exact" if nominal else "walk", course.length) as advance:
         return follow_course(
             env,
-            LearnedController(policy, env.num_envs),
+            policy.controller(env.cfg),
             course,
             args.beta,
             args.seed,

@@ -28,7 +28,7 @@ from mute.command_lines.arguments import (
     parse,
 )
 from mute.command_lines.play_figures import live_captions, report, summary
-from mute.command_lines.policy_options import PolicyArgs
+from mute.command_lines.policy_options import DriverArgs
 from mute.command_lines.sound_options import (
     MicrophonePlace,
     Sources,
@@ -36,9 +36,8 @@ from mute.command_lines.sound_options import (
     find_microphone,
     progress_bar,
 )
-from mute.controllers import LearnedController, load_policy
 from mute.controllers.command import COMMAND_LIMITS, Command
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.scene import Look
 from mute.envs.terrain import KINDS, TerrainCfg
@@ -75,7 +74,7 @@ Where there is a display, a window opens; else figures are printed as it walks.
 
 
 @dataclass
-class PlayArgs(PolicyArgs):
+class PlayArgs(DriverArgs):
     """Arguments of `play.py`."""
 
     beta: float = 0.5
@@ -233,18 +232,18 @@ def _wants_window(args: PlayArgs) -> bool:
 
 
 def _make_session(args: PlayArgs, endless: bool) -> Session:
-    policy = load_policy(args.with_policy_found().policy)
+    policy = args.with_driver_found().driver()
     seconds = LONGEST_WALK if endless else args.seconds or _DEFAULT_SECONDS
     stand_time = min(_STAND_TIME, 0.25 * seconds) if args.begin == "standing" else 0.0
     settle_time = min(stand_time + _SETTLE_TIME, 0.5 * seconds)
     env = _make_env(args, policy, seconds)
     listener = _make_listener(args, env, settle_time)
     _print_header(args, policy)
-    controller = LearnedController(policy, args.num_envs)
+    controller = policy.controller(env.cfg)
     return Session(env, controller, args.command, settle_time, listener, stand_time)
 
 
-def _make_env(args: PlayArgs, policy: Policy, seconds: float) -> QuadrupedEnv:
+def _make_env(args: PlayArgs, policy: Driver, seconds: float) -> QuadrupedEnv:
     """Return the robots, on a floor and with physics that can be heard if that is wanted.
 
     Raises:
@@ -346,7 +345,7 @@ def _walk_in_text(
                 print(f"{session.seconds:5.1f} s", *figures, sep=" | ", flush=True)
 
 
-def _print_header(args: PlayArgs, policy: Policy) -> None:
+def _print_header(args: PlayArgs, policy: Driver) -> None:
     command = args.command
     print(
         f"{policy.task}, iteration {policy.iteration}: beta {command.beta:g}, asked for "

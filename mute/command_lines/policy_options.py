@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Literal, Self
 
+from mute.acoustics.origin import policy_origin, sound_origin
 from mute.checkpoint import CheckpointError, latest_checkpoint, load_checkpoint
 from mute.command_lines.arguments import task_name
+from mute.controllers import load_policy
+from mute.controllers.driver import Driver
+from mute.controllers.mpc.driver import MpcDriver
+from mute.controllers.mpc.settings import MpcCfg
 from mute.support.errors import MuteError
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK, make_task
 
-__all__ = ["PolicyArgs"]
+__all__ = ["DriverArgs", "PolicyArgs"]
 
 
 _SHIPPED = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
@@ -64,6 +71,68 @@ class PolicyArgs:
         if task != self.task:
             raise CheckpointError(f"{self.policy} is of task {task!r}, not {self.task!r}")
         return self.policy
+
+
+@dataclass
+class DriverArgs(PolicyArgs):
+    """The arguments of every command that robots walk in."""
+
+    controller: Literal["policy", "mpc", "mpc_true_velocity"] = "policy"
+    """What drives the robots: the policy; mpc, a model-predictive controller, which needs none; or
+    mpc_true_velocity, the same with its true velocity, which no robot can measure."""
+
+    def with_driver_found(self) -> Self:
+        """Return the same arguments, the policy, where one drives, as the file that is meant.
+
+        Raises:
+            MuteError: If a policy is named for a controller that has none, or there is none.
+        """
+        if self.controller == "policy":
+            return self.with_policy_found()
+        for name, value, default in (("policy", self.policy, _SHIPPED), ("task", self.task, None)):
+            if value != default:
+                raise MuteError(
+                    f"--{name} goes with --controller policy alone, got {str(value)!r} with "
+                    f"--controller {self.controller}"
+                )
+        return self
+
+    @property
+    def driver_name(self) -> str:
+        """What drives the robots, in a word: the file of the policy, or the controller."""
+        return str(self.policy) if self.controller == "policy" else self.controller
+
+    def driver(self) -> Driver:
+        """Return what drives the robots, once it is found.
+
+        Raises:
+            MuteError: If it cannot be used.
+        """
+        return load_policy(self.policy) if self.controller == "policy" else self._mpc()
+
+    def _mpc(self) -> MpcDriver:
+        settings = MpcCfg(true_velocity=self.controller == "mpc_true_velocity")
+        return MpcDriver(settings=settings, task=self.controller)
+
+    def origin(self) -> dict[str, str]:
+        """Return what modelled levels rest on, see `sound_origin`, once it is found.
+
+        Raises:
+            MuteError: If the policy or the calibration cannot be read.
+        """
+        return self.driver_origin() | sound_origin()
+
+    def driver_origin(self) -> dict[str, str]:
+        """Return what drives the robots, and a digest of it: of the file, or of the settings.
+
+        Raises:
+            MuteError: If the policy cannot be read.
+        """
+        if self.controller == "policy":
+            return policy_origin(self.policy)
+        settings = json.dumps(dataclasses.asdict(self._mpc().settings)).encode()
+        digest = hashlib.sha256(settings).hexdigest()
+        return {"policy": self.controller, "policy_sha256": digest}
 
 
 def _that_ships(task: str) -> Path:

@@ -14,6 +14,7 @@ from mute.checkpoint import CheckpointError, first_line, load_checkpoint
 from mute.config import TaskCfg, from_plain
 from mute.envs.observations import OBS_DIM
 from mute.envs.quadruped_env import NUM_ACTIONS
+from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.learning.estimated_env import actor_groups, make_estimator
 from mute.learning.model import PreparedModel
 from mute.learning.saved_state import check_form, check_iteration, check_weights, entry
@@ -36,6 +37,10 @@ class Policy:
     """The estimator, in evaluation mode."""
     actor: PreparedModel
     """The actor, its normaliser inside, in evaluation mode."""
+
+    def controller(self, cfg: QuadrupedEnvCfg) -> LearnedController:
+        """Return what drives the robots of an environment with it, without a past."""
+        return LearnedController(self, cfg.num_envs)
 
 
 def load_policy(path: Path) -> Policy:

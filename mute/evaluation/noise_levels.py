@@ -19,8 +19,7 @@ from mute.acoustics.microphone import Microphone
 from mute.acoustics.physics.room import OPEN, Room
 from mute.acoustics.soundscape import SOURCES
 from mute.acoustics.tally import HeardLevels
-from mute.controllers import LearnedController
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.gait import Gait
 from mute.evaluation.intervals import mean_with_interval
@@ -117,7 +116,7 @@ class NoiseRow:
 
 
 def measure_noise(
-    policy: Policy,
+    policy: Driver,
     surface: str,
     settings: Sequence[NoiseSetting],
     trials: int,
@@ -189,7 +188,7 @@ def measure_noise(
             if on_step is not None:
                 on_step()
 
-        meter = run_trial(env, LearnedController(policy, robots), commands, steps, hear)
+        meter = run_trial(env, policy.controller(env.cfg), commands, steps, hear)
     kept.note_clipped(listener.clipped)
     levels = listener.levels()
     weight = robot_weight(env)

@@ -6,8 +6,7 @@ import dataclasses
 
 import torch
 
-from mute.controllers import LearnedController
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
@@ -30,7 +29,7 @@ _WINDOW = 0.5
 """Time in which every foot lands, s."""
 
 
-def walk_figures(policy: Policy, cfg: QuadrupedEnvCfg, beta: float) -> dict[str, float]:
+def walk_figures(policy: Driver, cfg: QuadrupedEnvCfg, beta: float) -> dict[str, float]:
     """Return what a policy's walk is like at the physics steps.
 
     Args:
@@ -61,7 +60,7 @@ def walk_figures(policy: Policy, cfg: QuadrupedEnvCfg, beta: float) -> dict[str,
     env.physics_listeners.append(record)
     command = torch.tensor([_SPEED, 0.0, 0.0, beta])
     steps = round(cfg.episode_length / env.step_dt) - 1
-    gait = run_trial(env, LearnedController(policy, cfg.num_envs), command, steps).gait()
+    gait = run_trial(env, policy.controller(cfg), command, steps).gait()
     if gait.unstable:
         raise RuntimeError(f"{gait.unstable} simulations blew up: their steps are no walk's")
     first, window = (round(time / cfg.scene.timestep) for time in (_SETTLE, _WINDOW))

@@ -6,9 +6,11 @@ not as its task does: one that was trained on tame robots is judged on the same 
 
 from __future__ import annotations
 
+import copy
 import dataclasses
+from typing import TypeVar
 
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.envs.observations import ObservationsCfg
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
@@ -17,8 +19,11 @@ from mute.evaluation.trials import evaluation_cfg
 __all__ = ["robots_cfg", "under_conditions"]
 
 
-def under_conditions(policy: Policy) -> Policy:
-    """Return a policy whose configuration has the usual randomisation and noise."""
+_SomeDriver = TypeVar("_SomeDriver", bound=Driver)
+
+
+def under_conditions(policy: _SomeDriver) -> _SomeDriver:
+    """Return a policy, or another driver, with the usual randomisation and noise."""
     env = policy.cfg.env
     usual = ObservationsCfg()
     env = dataclasses.replace(
@@ -28,11 +33,13 @@ def under_conditions(policy: Policy) -> Policy:
         ),
         randomization=RandomizationCfg(push_interval=0.0),
     )
-    return dataclasses.replace(policy, cfg=dataclasses.replace(policy.cfg, env=env))
+    changed = copy.copy(policy)
+    changed.cfg = dataclasses.replace(policy.cfg, env=env)
+    return changed
 
 
 def robots_cfg(
-    policy: Policy, robots: int, seconds: float, seed: int, nominal: bool = False
+    policy: Driver, robots: int, seconds: float, seed: int, nominal: bool = False
 ) -> QuadrupedEnvCfg:
     """Return the environment to measure a policy in.
 

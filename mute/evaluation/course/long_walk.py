@@ -24,7 +24,7 @@ from mute.acoustics.physics.room import OPEN, Room
 from mute.acoustics.soundscape import SOURCES
 from mute.acoustics.tally import HeardLevels
 from mute.controllers.controller import Controller
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.scene import FloorPatch
 from mute.evaluation.course.course import Course
@@ -146,7 +146,7 @@ def time_limit(course: Course) -> float:
 
 
 def make_walk_env(
-    policy: Policy, course: Course, seed: int, robots: int = 1, nominal: bool = False
+    policy: Driver, course: Course, seed: int, robots: int = 1, nominal: bool = False
 ) -> QuadrupedEnv:
     """Return an environment of robots on the floors of a course, each alone, facing along +x.
 

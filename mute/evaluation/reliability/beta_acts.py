@@ -9,8 +9,7 @@ from typing import Any
 
 import torch
 
-from mute.controllers import LearnedController
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.evaluation.gait import GaitMeter
 from mute.evaluation.matched_speed import figures_at_speed, level_at_speed
 from mute.evaluation.noise_levels import SETTLE_TIME, NoiseSetting, measure_noise
@@ -45,7 +44,7 @@ _LEVEL_DROP = 4.0
 """By how much the mean noise level must be lower at beta 1, dB."""
 
 
-def measure_beta_acts(policy: Policy, robots: int, seed: int, on_work: OnWork) -> PartResult:
+def measure_beta_acts(policy: Driver, robots: int, seed: int, on_work: OnWork) -> PartResult:
     """Measure what beta changes at equal actual speeds.
 
     Args:
@@ -104,7 +103,7 @@ def _heard(robots: int) -> int:
     return max(1, robots // 32)
 
 
-def _at_speeds(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[dict[str, Any]]:
+def _at_speeds(policy: Driver, each: int, seed: int, on_work: OnWork) -> list[dict[str, Any]]:
     """Return the figures of every beta at every actual speed."""
     settings = torch.tensor([(speed, 0.0, 0.0, beta) for beta in BETAS for speed in _COMMANDS])
     command, setting = dealt(settings, each)
@@ -116,7 +115,7 @@ def _at_speeds(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[di
         on_work(len(command) * env.step_dt)
 
     env.reset()
-    walk(env, LearnedController(policy, len(command)), command, _WALK_TIME, watch)
+    walk(env, policy.controller(env.cfg), command, _WALK_TIME, watch)
     gaits = [meter.gait(setting == index) for index in range(len(settings))]
     count = len(_COMMANDS)
     own = {beta: gaits[i * count : (i + 1) * count] for i, beta in enumerate(BETAS)}
@@ -129,7 +128,7 @@ def _at_speeds(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[di
     return rows
 
 
-def _levels(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[dict[str, float]]:
+def _levels(policy: Driver, each: int, seed: int, on_work: OnWork) -> list[dict[str, float]]:
     """Return the level of the loudest and of the quietest beta at equal actual speed."""
     ends = (BETAS[0], BETAS[-1])
     settings = [NoiseSetting(beta, speed) for beta in ends for speed in _HEARD_COMMANDS]

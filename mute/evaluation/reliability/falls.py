@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from mute.controllers import LearnedController
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.evaluation.reliability.conditions import OnWork, make_env, walk
 from mute.evaluation.reliability.figures import Figure, PartResult, Target
 from mute.evaluation.trials import command_sampler
@@ -18,7 +17,7 @@ _EPISODE = 20.0
 _FALLS = Target(below=0.01)
 
 
-def measure_falls(policy: Policy, robots: int, seed: int, on_work: OnWork) -> PartResult:
+def measure_falls(policy: Driver, robots: int, seed: int, on_work: OnWork) -> PartResult:
     """Measure the share of robots that fall in an episode.
 
     Commands and betas are drawn evenly from the task's ranges, and drawn anew within the episode.
@@ -30,7 +29,7 @@ def measure_falls(policy: Policy, robots: int, seed: int, on_work: OnWork) -> Pa
         on_work: Is told of the work that is done.
     """
     env = make_env(robots_cfg(policy, robots, _EPISODE, seed))
-    controller = LearnedController(policy, robots)
+    controller = policy.controller(env.cfg)
     cfg = policy.cfg.env.commands.drawn_evenly()
     sampler = command_sampler(cfg, robots, seed)
     everyone = torch.ones(robots, dtype=torch.bool)

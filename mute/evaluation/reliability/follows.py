@@ -7,8 +7,7 @@ from dataclasses import asdict, dataclass
 
 import torch
 
-from mute.controllers import LearnedController
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.envs.commands import BETA, CommandSampler
 from mute.evaluation.gait import GaitMeter
 from mute.evaluation.reliability.conditions import (
@@ -58,7 +57,7 @@ class Following:
     """Actual over commanded speed."""
 
 
-def measure_follows(policy: Policy, robots: int, seed: int, on_work: OnWork) -> PartResult:
+def measure_follows(policy: Driver, robots: int, seed: int, on_work: OnWork) -> PartResult:
     """Measure speeds, errors over the command range, and falls in stop and go.
 
     Args:
@@ -85,7 +84,7 @@ def follows_work(robots: int) -> float:
     return at_speeds + len(_BETAS) * _half(robots) * (_RANGE_TIME + _CHANGES * _CHANGE_TIME)
 
 
-def velocity_errors(policy: Policy, each: int, seed: int, on_work: OnWork) -> dict[float, float]:
+def velocity_errors(policy: Driver, each: int, seed: int, on_work: OnWork) -> dict[float, float]:
     """Return the mean squared velocity error over the command range by beta, (m/s)^2.
 
     The commands are drawn evenly from the ranges of the policy's task, a tenth of them zero,
@@ -99,7 +98,7 @@ def velocity_errors(policy: Policy, each: int, seed: int, on_work: OnWork) -> di
     """
     robots = each * len(_BETAS)
     env = make_env(robots_cfg(policy, robots, _RANGE_TIME, seed))
-    controller = LearnedController(policy, robots)
+    controller = policy.controller(env.cfg)
     setting = torch.arange(robots) % len(_BETAS)
     sampler = command_sampler(policy.cfg.env.commands.drawn_evenly(), robots, seed)
     command = _drawn(sampler, setting)
@@ -115,7 +114,7 @@ def velocity_errors(policy: Policy, each: int, seed: int, on_work: OnWork) -> di
     return {beta: gait.velocity_error_sq for beta, gait in zip(_BETAS, gaits, strict=True)}
 
 
-def stop_and_go_falls(policy: Policy, each: int, seed: int, on_work: OnWork) -> dict[float, float]:
+def stop_and_go_falls(policy: Driver, each: int, seed: int, on_work: OnWork) -> dict[float, float]:
     """Return the share of robots that fall in 20 s of a new command every 2 s, by beta.
 
     Args:
@@ -126,7 +125,7 @@ def stop_and_go_falls(policy: Policy, each: int, seed: int, on_work: OnWork) -> 
     """
     robots = each * len(_BETAS)
     env = make_env(robots_cfg(policy, robots, _CHANGES * _CHANGE_TIME, seed))
-    controller = LearnedController(policy, robots)
+    controller = policy.controller(env.cfg)
     setting = torch.arange(robots) % len(_BETAS)
     cfg = policy.cfg.env.commands.drawn_evenly(_STOPPED_SHARE)
     sampler = command_sampler(cfg, robots, seed)
@@ -144,7 +143,7 @@ def stop_and_go_falls(policy: Policy, each: int, seed: int, on_work: OnWork) -> 
     }
 
 
-def _ratios(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[Following]:
+def _ratios(policy: Driver, each: int, seed: int, on_work: OnWork) -> list[Following]:
     settings = torch.tensor([(speed, 0.0, 0.0, beta) for beta in _BETAS for speed in SPEEDS])
     command, setting = dealt(settings, each)
     env = make_env(robots_cfg(policy, len(command), _WALK_TIME, seed))
@@ -155,7 +154,7 @@ def _ratios(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[Follo
         on_work(len(command) * env.step_dt)
 
     env.reset()
-    walk(env, LearnedController(policy, len(command)), command, _WALK_TIME, watch)
+    walk(env, policy.controller(env.cfg), command, _WALK_TIME, watch)
     pairs = [(beta, speed) for beta in _BETAS for speed in SPEEDS]
     speeds = [meter.gait(setting == index).speed for index in range(len(pairs))]
     return [

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.evaluation.reliability.beta_acts import beta_acts_work, measure_beta_acts
 from mute.evaluation.reliability.conditions import OnWork
 from mute.evaluation.reliability.falls import falls_work, measure_falls
@@ -21,7 +21,7 @@ __all__ = ["PARTS", "Part"]
 class Part:
     """One part of the exam."""
 
-    measure: Callable[[Policy, int, int, OnWork], PartResult]
+    measure: Callable[[Driver, int, int, OnWork], PartResult]
     """Measures a policy `under_conditions` with a number of robots and a seed; tells its work."""
     work: Callable[[int], float]
     """Work with that many robots, s."""

@@ -15,8 +15,7 @@ import torch
 
 from mute.acoustics.audible_env import listening_cfg
 from mute.acoustics.listener import Listener
-from mute.controllers import LearnedController
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.evaluation.obedience import STILL_SPEED
@@ -108,7 +107,7 @@ class Stillness:
         return self._joint_speed / self._steps
 
 
-def measure_stands(policy: Policy, robots: int, seed: int, on_work: OnWork) -> PartResult:
+def measure_stands(policy: Driver, robots: int, seed: int, on_work: OnWork) -> PartResult:
     """Measure how robots stand, how they recover, and what they sound like.
 
     Args:
@@ -148,7 +147,7 @@ class _Robots:
 
     def __init__(
         self,
-        policy: Policy,
+        policy: Driver,
         cfg: QuadrupedEnvCfg,
         on_work: OnWork,
         weight: float = 1.0,
@@ -162,7 +161,7 @@ class _Robots:
             weight: Work of a second that a robot walks, s.
         """
         self.env = make_env(cfg)
-        self._controller = LearnedController(policy, cfg.num_envs)
+        self._controller = policy.controller(cfg)
         seconds = weight * cfg.num_envs * cfg.step_dt
         self._done = lambda _: on_work(seconds)
         settings = torch.zeros(len(BETAS), 4)
@@ -193,7 +192,7 @@ class _Robots:
 
 
 def _stood_and_pushed(
-    policy: Policy, each: int, seed: int, on_work: OnWork
+    policy: Driver, each: int, seed: int, on_work: OnWork
 ) -> tuple[list[float], list[float]]:
     """Return by beta the share that stands, and the share that does so again after the push."""
     seconds = _WALK_TIME + SETTLE_TIME + _STAND_TIME + _RECOVERY_TIME
@@ -211,7 +210,7 @@ def _stood_and_pushed(
     return robots.means(standing.feet_down), robots.means(recovered)
 
 
-def _joint_speeds(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[float]:
+def _joint_speeds(policy: Driver, each: int, seed: int, on_work: OnWork) -> list[float]:
     """Return the mean speed of the joints of robots that stand with exact sensors, rad/s."""
     seconds = _WALK_TIME + SETTLE_TIME + _STAND_TIME
     cfg = without_noise(robots_cfg(policy, each * len(BETAS), seconds, seed))
@@ -222,7 +221,7 @@ def _joint_speeds(policy: Policy, each: int, seed: int, on_work: OnWork) -> list
     return robots.means(standing.joint_speed)
 
 
-def _levels(policy: Policy, each: int, seed: int, on_work: OnWork) -> list[float]:
+def _levels(policy: Driver, each: int, seed: int, on_work: OnWork) -> list[float]:
     """Return the mean noise level of robots that stand, on wood, dBA."""
     settled = _WALK_TIME + SETTLE_TIME
     cfg = robots_cfg(policy, each * len(BETAS), settled + _STAND_TIME, seed)

@@ -18,9 +18,8 @@ from dataclasses import asdict, dataclass
 
 import torch
 
-from mute.controllers import LearnedController
 from mute.controllers.controller import Controller
-from mute.controllers.learned import Policy
+from mute.controllers.driver import Driver
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.obedience import GOING_SHARE, along_command
 from mute.evaluation.reliability.conditions import (
@@ -98,7 +97,7 @@ def going_times(progress: torch.Tensor, ended: torch.Tensor, step_dt: float) -> 
     return torch.where(in_time & lasting & ~ended, first, math.inf)
 
 
-def measure_starts(policy: Policy, robots: int, seed: int, on_work: OnWork) -> PartResult:
+def measure_starts(policy: Driver, robots: int, seed: int, on_work: OnWork) -> PartResult:
     """Start randomised robots with noisy sensors, and the exact robot with exact sensors.
 
     Args:
@@ -108,12 +107,10 @@ def measure_starts(policy: Policy, robots: int, seed: int, on_work: OnWork) -> P
         on_work: Is told of the work that is done.
     """
     seconds = STAND_TIME + TRIAL_TIME
-    controller = LearnedController(policy, robots * len(BETAS))
-    cfg = from_the_stance(robots_cfg(policy, controller.num_envs, seconds, seed))
-    randomized = starts_of(make_env(cfg), controller, on_work)
-    one_each = LearnedController(policy, len(BETAS))
-    nominal_cfg = evaluation_cfg(policy.cfg.env, one_each.num_envs, seconds, seed)
-    nominal = starts_of(make_env(from_the_stance(nominal_cfg)), one_each, on_work)
+    cfg = from_the_stance(robots_cfg(policy, robots * len(BETAS), seconds, seed))
+    randomized = starts_of(make_env(cfg), policy.controller(cfg), on_work)
+    exact = from_the_stance(evaluation_cfg(policy.cfg.env, len(BETAS), seconds, seed))
+    nominal = starts_of(make_env(exact), policy.controller(exact), on_work)
     figures = [_least_share(randomized, beta) for beta in BETAS]
     figures += [_nominal(nominal, beta) for beta in BETAS]
     tables = {

@@ -35,6 +35,16 @@ def test_evaluate_gait_writes_its_figures(policy_path, tmp_path, capsys):
     assert "at an actual speed" in capsys.readouterr().out
 
 
+def test_a_controller_without_an_estimator_is_measured_too(tmp_path, capsys):
+    arguments = ["gait", "--controller", "mpc", "--trials", "4", "--seconds", "1.2"]
+    assert evaluate.main([*arguments, "--beta", "0", "--out", str(tmp_path)]) == 0
+    summary = json.loads((tmp_path / "gait.json").read_text())
+    assert summary["policy"] == "mpc"
+    assert summary["range"][0]["fall_rate"] == 0.0
+    assert "phase_mae" not in summary["range"][0]
+    assert "phase_mae" not in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("arguments", "names"),
     [

@@ -12,7 +12,7 @@ from places import SHIPPED_POLICY
 
 from mute.checkpoint import load_checkpoint, save_checkpoint
 from mute.command_lines import calibrate, evaluate, export, play
-from mute.command_lines.policy_options import PolicyArgs
+from mute.command_lines.policy_options import DriverArgs, PolicyArgs
 from mute.support.errors import MuteError
 
 COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], list[str]]] = {
@@ -76,3 +76,37 @@ def test_the_latest_policy_is_the_one_that_is_exported(runs: Path, tmp_path: Pat
     out = tmp_path / "policy.onnx"
     export.main(["--policy", "latest", "--log-dir", str(runs), "--out", str(out)])
     assert out.stat().st_size > 100_000
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"policy": Path("x.pt")}, "--policy goes with --controller policy alone, got 'x.pt'"),
+        ({"task": "go1_mute"}, "--task goes with --controller policy alone, got 'go1_mute'"),
+    ],
+)
+def test_a_policy_named_for_a_controller_that_has_none_is_refused(given, message):
+    with pytest.raises(MuteError, match=message):
+        DriverArgs(controller="mpc", **given).with_driver_found()
+
+
+def test_what_drives_is_the_policy_or_a_controller_and_is_told_apart_where_levels_rest_on_it():
+    policy = DriverArgs().with_driver_found()
+    exact = DriverArgs(controller="mpc_true_velocity")
+    assert policy.driver().task == "go1_mute"
+    assert exact.driver().task == "mpc_true_velocity"
+    origins = [args.origin() for args in (policy, DriverArgs(controller="mpc"), exact)]
+    assert [origin["policy"] for origin in origins[1:]] == ["mpc", "mpc_true_velocity"]
+    assert len({origin["policy_sha256"] for origin in origins}) == 3
+    assert {tuple(origin) for origin in origins} == {tuple(origins[0])}
+
+
+def test_the_policy_that_is_measured_is_the_one_that_is_named_whatever_is_saved_meanwhile(
+    runs: Path,
+):
+    args = DriverArgs(policy=Path("latest"), task="go1_mute", log_dir=runs).with_driver_found()
+    newer = runs / "go1_mute" / "run" / "model_11.pt"
+    save_checkpoint(newer, load_checkpoint(SHIPPED_POLICY) | {"iter": 11})
+    assert args.driver().iteration == 10
+    assert args.origin()["policy"].endswith("model_10.pt")
+    assert args.driver_name.endswith("model_10.pt")
