@@ -16,6 +16,7 @@ from mute.acoustics.soundscape import SOURCES
 from mute.command_lines.arguments import command_line, make_directory, parse
 from mute.command_lines.calibrate import REFERENCES
 from mute.command_lines.card_benchmark import BenchmarkFiles, benchmark_page
+from mute.command_lines.card_mpc import mpc_figures
 from mute.command_lines.card_reliability import SeedFiles, read_seeds
 from mute.command_lines.card_results import ResultFiles, results_page
 from mute.command_lines.card_sound import predicted_and_measured
@@ -48,12 +49,15 @@ class CardArgs:
     `evaluate.py gait` as seed0_gait.json."""
     terrain: Path = _DOCS / "terrain" / "terrain.json"
     """File that `evaluate.py terrain` wrote; speed.json of `benchmarks.terrain` lies beside it."""
+    mpc: Path = _DOCS / "mpc"
+    """Directory of what `evaluate.py reliability` and `noise` wrote with --controller mpc, and
+    speed.json of `benchmarks.mpc`."""
     benchmark: Path = _DOCS / "benchmark.json"
     """File that `mute.benchmark --out` wrote; peers.json, peer_walks.json, physics.json and
     walking.json lie beside it."""
     out: Path | None = None
-    """Directory of the pages results.md, sound.md, terrain.md and benchmark.md; printed if not
-    given."""
+    """Directory of the pages results.md, sound.md, terrain.md, mpc.md and benchmark.md; printed if
+    not given."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -73,6 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             predicted_and_measured(results.noise, results.sweep_beta, results.walk, results.fitted),
         ),
         "terrain.md": _terrain_page(args.terrain),
+        "mpc.md": _mpc_page(args.mpc),
         "benchmark.md": benchmark_page(read_benchmarks(args)),
     }
     if args.out is None:
@@ -94,6 +99,18 @@ def _terrain_page(path: Path) -> str:
     page = with_part(_page("terrain.md"), "figures", terrain_figures(_read(path)))
     speed = _read(path.parent / "speed.json", "rates", "options", "num_envs", "turns", "machine")
     return with_part(page, "speed", terrain_speed(speed))
+
+
+def _mpc_page(directory: Path) -> str:
+    """Return the page on the model-predictive controller, of which one part is made.
+
+    Raises:
+        MuteError: If a file is missing.
+    """
+    reliability = _read(directory / "reliability.json", "figures", "robots", "machine")
+    noise = _read_rows(directory / "noise.json", *_LEVELS)
+    speed = _read(directory / "speed.json", "walks", "machine")
+    return with_part(_page("mpc.md"), "figures", mpc_figures(reliability, noise, speed))
 
 
 def read_results(args: CardArgs) -> ResultFiles:

@@ -33,6 +33,7 @@ _MODULES = {
     "-m mute.release": "mute.command_lines.release",
     "-m mute.card": "mute.command_lines.card",
     "-m benchmarks.levers": "benchmarks.levers",
+    "-m benchmarks.mpc": "benchmarks.mpc",
     "-m benchmarks.make_peers": "benchmarks.make_peers",
     "-m benchmarks.peer_walks": "benchmarks.peer_walks",
     "-m benchmarks.physics": "benchmarks.physics",

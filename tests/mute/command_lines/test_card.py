@@ -15,13 +15,15 @@ from mute.command_lines.card_results import results_page, summary
 from mute.command_lines.card_tables import markdown, mean_and_spread
 from mute.support.errors import MuteError
 
+_MPC = ["# The model-predictive controller"]
+
 
 @pytest.fixture(scope="module")
 def files():
     return card.read_results(card.CardArgs())
 
 
-@pytest.mark.parametrize("name", ["results.md", "sound.md", "terrain.md", "benchmark.md"])
+@pytest.mark.parametrize("name", ["results.md", "sound.md", "terrain.md", "mpc.md", "benchmark.md"])
 def test_a_committed_page_is_what_the_command_makes(name, tmp_path):
     assert card.main(["--out", str(tmp_path)]) == 0
     made, committed = (folder / name for folder in (tmp_path, REPOSITORY / "docs"))
@@ -36,7 +38,7 @@ def test_the_front_page_has_the_table_of_the_results_and_says_what_it_is_of(file
 def test_without_a_directory_all_pages_are_printed(capsys):
     assert card.main([]) == 0
     headings = re.findall("^# .*$", capsys.readouterr().out, re.MULTILINE)
-    assert headings == ["# Results", "# The sound model", "# Ground", "# Speed"]
+    assert headings == ["# Results", "# The sound model", "# Ground", *_MPC, "# Speed"]
 
 
 def test_a_spread_is_that_of_the_trainings(files):
