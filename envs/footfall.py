@@ -95,7 +95,10 @@ class Footfalls:
         self.landing_speed = torch.zeros_like(self.drop_sq)
         """Landing speed where `touchdown`, else 0, m/s. Shape: (num_envs, 4)."""
         self.swing_apex = torch.zeros_like(self.drop_sq)
-        """Highest clearance of the current or, in stance, last swing, m. Shape: (num_envs, 4)."""
+        """How far the highest point of the current or, in stance, last swing was above the highest
+        ground that it came near, m. Shape: (num_envs, 4)."""
+        self._highest = torch.full_like(self.drop_sq, _NOWHERE)
+        self._highest_ground = torch.full_like(self.drop_sq, _NOWHERE)
 
     @property
     def contact(self) -> torch.Tensor:
@@ -137,11 +140,12 @@ class Footfalls:
         torch.clamp(foot_vel_z, min=0.0, out=self._raise)
         torch.gt(found, 0.0, out=self._touch[keep:])
 
-    def update(self, clearance: torch.Tensor) -> None:
+    def update(self, height: torch.Tensor, ground: torch.Tensor) -> None:
         """Close the control step: contacts, phase, landings and apexes.
 
         Args:
-            clearance: Height under each foot, m. Shape: (num_envs, 4).
+            height: Of the lowest point of each foot, world, m. Shape: (num_envs, 4).
+            ground: Height of the highest ground near it, m. Shape: (num_envs, 4).
         """
         recent = slice(self._depth - self._decimation, self._depth)
         self.drop_sq = self._drop[recent].square().mean(dim=0)
@@ -152,10 +156,11 @@ class Footfalls:
         # Before the update: a foot that the update declares landed has reached its apex already.
         in_stance = self._contacts.contact.clone()
         self._contacts.update(self.raw_contact)
-        rising = torch.maximum(self.swing_apex, clearance)
         lifting = in_stance & ~self._contacts.contact
+        self._highest = _highest(self._highest, height, lifting, in_stance)
+        self._highest_ground = _highest(self._highest_ground, ground, lifting, in_stance)
         self.swing_apex = torch.where(
-            lifting, clearance, torch.where(in_stance, self.swing_apex, rising)
+            in_stance & ~lifting, self.swing_apex, self._highest - self._highest_ground
         )
         self.landing_speed = self._landing_speed()
 
@@ -175,6 +180,8 @@ class Footfalls:
         self.raw_contact = torch.where(column, raw, self.raw_contact)
         for name in ("drop_sq", "raise_sq", "contact_share", "landing_speed", "swing_apex"):
             setattr(self, name, getattr(self, name).masked_fill(column, 0.0))
+        for name in ("_highest", "_highest_ground"):
+            setattr(self, name, getattr(self, name).masked_fill(column, _NOWHERE))
 
     def state_dict(self) -> dict[str, torch.Tensor]:
         """Return all that is needed to continue bit for bit."""
@@ -185,7 +192,10 @@ class Footfalls:
     def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
         """Continue from a `state_dict`."""
         for name in _STATE_TENSORS:
-            setattr(self, name, state[name].to(self._drop.device, copy=True))
+            # Earlier versions have an apex above level ground alone.
+            value = state.get(name, state["swing_apex"] if name == "_highest" else None)
+            value = torch.zeros_like(self.swing_apex) if value is None else value
+            setattr(self, name, value.to(self._drop.device, copy=True))
         prefix = "contacts/"
         contacts = {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}
         self._contacts.load_state_dict(contacts)
@@ -215,4 +225,18 @@ _STATE_TENSORS = (
     "raw_contact",
     "landing_speed",
     "swing_apex",
+    "_highest",
+    "_highest_ground",
 )
+
+
+_NOWHERE = -1e6
+"""Below every height, m: what a swing that begins in the air has been at so far."""
+
+
+def _highest(
+    before: torch.Tensor, now: torch.Tensor, lifting: torch.Tensor, in_stance: torch.Tensor
+) -> torch.Tensor:
+    """Return the highest of each foot's swing so far; of who lifts, what it is now."""
+    rising = torch.maximum(before, now)
+    return torch.where(lifting, now, torch.where(in_stance, before, rising))

@@ -52,6 +52,8 @@ class Motion:
     """Horizontal speed of each foot. Shape: (num_envs, 4)."""
     foot_height: torch.Tensor
     """Clearance under each foot, m. Shape: (num_envs, 4)."""
+    foot_lift: torch.Tensor
+    """The same above the highest ground near each foot, m. Shape: (num_envs, 4)."""
     contact: torch.Tensor
     """Debounced contact of each foot, bool. Shape: (num_envs, 4)."""
     touchdown: torch.Tensor
@@ -61,7 +63,8 @@ class Motion:
     stride_time: torch.Tensor
     """Time since the last landing of the feet that landed, else 0, s. Shape: (num_envs, 4)."""
     swing_apex: torch.Tensor
-    """Highest clearance of the current or last swing, m. Shape: (num_envs, 4)."""
+    """How far the current or last swing got above the highest ground near it, m.
+    Shape: (num_envs, 4)."""
     ground_slope: torch.Tensor
     """Rise of the ground from foot to foot, along the heading and to the left, m a metre.
     Shape: (num_envs, 2)."""

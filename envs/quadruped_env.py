@@ -101,6 +101,8 @@ class QuadrupedEnv(VecEnv):
         """The ground under the robots."""
         self._command_steps = self._steps_of_commands()
         self.travelled = Travelled(cfg.num_envs, self.device)
+        if isinstance(self.ground, BoxGround):
+            self.travelled.across = self.ground.across
         self.commands = CommandSampler(cfg.commands, cfg.num_envs, self.generator, self.device)
         self.footfalls = Footfalls(
             cfg.footfall, cfg.num_envs, cfg.scene.timestep, cfg.decimation, self.device
@@ -305,13 +307,10 @@ class QuadrupedEnv(VecEnv):
 
     def _motion(self, phase: torch.Tensor) -> Motion:
         feet = self.footfalls
-        # Feet and trunk in one call: looking up five heights takes hardly longer than one.
         foot_pos = self._sensors.foot_pos
-        points = torch.cat((foot_pos[:, :, :2], self.base_pos[:, None, :2]), dim=1)
-        heights = self.ground.height(points)
-        under = heights[:, : len(LEGS)]
-        clearance = foot_pos[:, :, 2] - FOOT_RADIUS - under
-        feet.update(clearance)
+        ground = self.ground.below(foot_pos[:, :, :2], self.base_pos[:, :2])
+        bottom = foot_pos[:, :, 2] - FOOT_RADIUS
+        feet.update(bottom, ground.near_feet)
         joint_acc = (self.joint_vel - self.last_joint_vel) / self.step_dt
         self.last_joint_vel = self.joint_vel.clone()
         torque = self.simulation.actuator_force
@@ -324,7 +323,7 @@ class QuadrupedEnv(VecEnv):
                 self.commands.command, self.base_lin_vel, self.base_ang_vel
             ),
             projected_gravity=self.projected_gravity,
-            base_height=self.base_pos[:, 2] - heights[:, len(LEGS)],
+            base_height=self.base_pos[:, 2] - ground.trunk,
             joint_pos=self.joint_pos,
             joint_vel=self.joint_vel,
             joint_acc=joint_acc,
@@ -337,13 +336,14 @@ class QuadrupedEnv(VecEnv):
             foot_drop_sq=feet.drop_sq,
             foot_raise_sq=feet.raise_sq,
             foot_speed_xy=self._sensors.foot_vel[:, :, :2].norm(dim=2),
-            foot_height=clearance,
+            foot_height=bottom - ground.feet,
+            foot_lift=bottom - ground.near_feet,
             contact=feet.contact,
             touchdown=feet.touchdown,
             landing_speed=feet.landing_speed,
             stride_time=feet.stride_time,
             swing_apex=feet.swing_apex,
-            ground_slope=slope_under(foot_pos[:, :, :2], under, self.heading),
+            ground_slope=slope_under(foot_pos[:, :, :2], ground.feet, self.heading),
             fallen=self.fallen,
         )
 
@@ -361,7 +361,7 @@ class QuadrupedEnv(VecEnv):
         place(self.simulation, mask, draw, heading, self.stand, self.cfg)
         self._renew_ground(mask)
         self._lift_to_ground(mask)
-        self.commands.resample(mask, True, self.curriculum.commands)
+        self._command(mask, True)
         self.footfalls.reset(mask, self._sensors.foot_contact)
         self.followed.reset(mask)
         self.travelled.reset(mask, self.simulation.qpos[:, :2].float())
@@ -396,10 +396,18 @@ class QuadrupedEnv(VecEnv):
         ground.key = torch.where(mask, (unit[1] * KEYS).long(), ground.key)
         ground.lay(self.simulation.qpos[:, :2], mask)
 
+    def _command(self, mask: torch.Tensor, with_beta: bool) -> None:
+        """Draw new commands for the masked robots, with beta where an episode begins."""
+        self.commands.resample(mask, with_beta, self.curriculum.commands)
+        share = self.cfg.terrain.turning_share
+        if share < 1.0 and isinstance(self.ground, BoxGround):
+            straight = mask & self.ground.across
+            self.commands.command[:, 2] *= torch.where(straight, share, 1.0)
+
     def _resample_and_push(self, dones: torch.Tensor) -> None:
         due = self._due(self._command_steps) & ~dones
         if bool(due.any()):
-            self.commands.resample(due, False, self.curriculum.commands)
+            self._command(due, False)
         cfg = self.cfg.randomization
         if not (cfg.enabled and cfg.push_interval > 0.0):
             return

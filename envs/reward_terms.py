@@ -298,9 +298,9 @@ def power_distribution(motion: Motion) -> torch.Tensor:
 def foot_clearance(motion: Motion, target: float) -> torch.Tensor:
     """Penalise feet that travel off their target clearance; DreamWaQ's.
 
-    Sum over feet of (target - clearance)^2 |v_xy|.
+    Sum over feet of (target - clearance)^2 |v_xy|, above the highest ground near the foot.
     """
-    error = (target - motion.foot_height).square()
+    error = (target - motion.foot_lift).square()
     return (error * motion.foot_speed_xy).sum(dim=1)
 
 

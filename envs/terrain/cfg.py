@@ -13,7 +13,7 @@ from .kinds import KINDS
 __all__ = ["GROUNDS", "TerrainCfg", "kind_of_robot"]
 
 GROUNDS: Mapping[str, Mapping[str, float]] = {
-    "indoor": {"flat": 0.3, "rooms": 0.5, "stairs": 0.1, "stairs_down": 0.1},
+    "indoor": {"flat": 0.3, "rooms": 0.3, "stairs": 0.25, "stairs_down": 0.15},
     "rough": {
         "flat": 0.1,
         "slopes": 0.1,
@@ -43,6 +43,10 @@ class TerrainCfg:
     """Time between new velocity commands where ground has levels, s; with 0 it is that of all
     commands. Commands that soon follow each other lead nowhere, and over nothing."""
 
+    turning_share: float = 1.0
+    """Share of the yaw rates' range that commands are drawn from where ground is crossed along x: a
+    robot that turns all the time climbs nothing."""
+
     def __post_init__(self) -> None:
         """Check the fields.
 
@@ -66,6 +70,7 @@ _RANGES = {
     "first_levels": Range(0, LEVELS - 1, whole=True),
     "crossed": Range(0.0, 1e6, above=True),
     "command_time": Range(0.0, 1e12),
+    "turning_share": Range(0.0, 1.0),
 }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import torch
 
@@ -23,6 +24,17 @@ def num_boxes(kinds: Iterable[str], drawn: bool = False) -> int:
     return max(
         (KINDS[name].wide_boxes if drawn else KINDS[name].boxes for name in kinds), default=0
     )
+
+
+class Below(NamedTuple):
+    """Heights of the ground below a robot, m."""
+
+    feet: torch.Tensor
+    """Under each foot. Shape: (num_envs, feet)."""
+    near_feet: torch.Tensor
+    """The highest within `_NEAR` of each foot, which it may meet soon. Shape: (num_envs, feet)."""
+    trunk: torch.Tensor
+    """Under the trunk. Shape: (num_envs,)."""
 
 
 class Ground(ABC):
@@ -59,6 +71,21 @@ class Ground(ABC):
         corners = feet[:, :, None] + radius * feet.new_tensor(_CORNERS)
         return self.height(corners, robots).amax(dim=2)
 
+    def below(self, feet: torch.Tensor, trunk: torch.Tensor) -> Below:
+        """Return the heights of the ground below a robot, all looked up at once.
+
+        Args:
+            feet: Places in the world, m. Shape: (num_envs, feet, 2).
+            trunk: Likewise. Shape: (num_envs, 2).
+        """
+        count = feet.shape[1]
+        around = feet[:, :, None] + _NEAR * feet.new_tensor(_CORNERS)
+        # To look up twenty heights takes hardly longer than one.
+        points = torch.cat((feet, trunk[:, None], around.flatten(1, 2)), dim=1)
+        heights = self.height(points)
+        under, near = heights[:, :count], heights[:, count + 1 :].unflatten(1, (count, -1))
+        return Below(under, torch.maximum(under, near.amax(dim=2)), heights[:, count])
+
     def heading(self, draw: torch.Tensor) -> torch.Tensor:
         """Return in which direction each robot begins, rad.
 
@@ -90,8 +117,18 @@ class Ground(ABC):
 _CORNERS = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
 
 
+_NEAR = 0.12
+"""How far from a foot ground counts as near, m: less than half a tread, as far as a foot at 1 m/s
+gets in what is left of a swing from its middle on."""
+
+
 class FlatGround(Ground):
     """An endless plane at height zero."""
+
+    def below(self, feet: torch.Tensor, trunk: torch.Tensor) -> Below:
+        """Return zeros, see `Ground.below`."""
+        zeros = torch.zeros_like(feet[..., 0])
+        return Below(zeros, zeros, zeros[:, 0])
 
     def height(self, points: torch.Tensor, robots: torch.Tensor | None = None) -> torch.Tensor:
         """Return zero everywhere, see `Ground.height`."""
@@ -128,6 +165,8 @@ class BoxGround(Ground):
         self._plane = model.geom("floor").id
         widest = torch.tensor([KINDS[name].max_heading for name in self.kinds], device=device)
         self._max_heading = widest[self.kind]
+        self.across = self._max_heading < math.pi
+        """Robots whose ground is crossed along x. Shape: (num_envs,)."""
         names = (GROUND_BOX.format(index) for index in range(num_boxes(self.kinds)))
         ids = [model.geom(name).id for name in names]
         self._boxes = torch.tensor(ids, dtype=torch.long, device=device)
@@ -157,7 +196,7 @@ class BoxGround(Ground):
         # The sign says whether up or down the x axis, the size how far beside it.
         beside = self._max_heading * (2.0 * draw.abs() - 1.0)
         limited = beside + torch.where(draw < 0.0, math.pi, 0.0)
-        return torch.where(self._max_heading < math.pi, limited, math.pi * draw)
+        return torch.where(self.across, limited, math.pi * draw)
 
     def lay(self, xy: torch.Tensor, anew: torch.Tensor | None = None) -> None:
         """Lay the boxes around the robots that have come into another cell.

@@ -18,6 +18,9 @@ class Travelled:
         """Where its episode began in the world. Shape: (num_envs, 2)."""
         self.away = torch.zeros(num_envs, device=device)
         """Distance from there. Shape: (num_envs,)."""
+        self.across = torch.zeros(num_envs, dtype=torch.bool, device=device)
+        """Robots whose ground is crossed along x alone: who walks beside stairs has climbed none.
+        Shape: (num_envs,)."""
         self.made = torch.zeros(num_envs, device=device)
         """Distance along the commanded direction. Shape: (num_envs,)."""
         self.asked = torch.zeros(num_envs, device=device)
@@ -34,7 +37,8 @@ class Travelled:
             base_lin_vel: Velocity in the body frame, m/s. Shape: (num_envs, 3).
             step_dt: Control period, s.
         """
-        self.away = (xy - self.start).norm(dim=1)
+        way = xy - self.start
+        self.away = torch.where(self.across, way[:, 0].abs(), way.norm(dim=1))
         speed = command[:, :2].norm(dim=1)
         along = (command[:, :2] * base_lin_vel[:, :2]).sum(dim=1) / speed.clamp(min=1e-6)
         self.made = self.made + step_dt * torch.where(speed > 0.0, along, 0.0)

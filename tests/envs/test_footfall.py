@@ -21,15 +21,16 @@ def _make_footfalls(num_envs=2, **given):
     return footfalls
 
 
-def _play(footfalls, found, vel_z=None, clearance=None, foot=(0, 0)):
+def _play(footfalls, found, vel_z=None, clearance=None, foot=(0, 0), ground=None):
     """Play physics steps to one foot; all others hang still. Return what each control step gave.
 
     Args:
         footfalls: Consumes the steps.
         found: `#` where there is contact, a character a physics step.
         vel_z: Vertical velocity at each physics step, m/s.
-        clearance: Clearance at each control step, m.
+        clearance: Height of the foot at each control step, m.
         foot: Index of the foot.
+        ground: Height of the ground near it at each control step, m; 0 unless given.
     """
     num_envs = footfalls.contact.shape[0]
     vel_z = vel_z or [0.0] * len(found)
@@ -44,7 +45,9 @@ def _play(footfalls, found, vel_z=None, clearance=None, foot=(0, 0)):
         footfalls.record(vel, contacts)
         heights = torch.zeros(num_envs, 4)
         heights[foot] = height
-        footfalls.update(heights)
+        near = torch.zeros(num_envs, 4)
+        near[foot] = ground[i] if ground else 0.0
+        footfalls.update(heights, near)
         names = ("touchdown", "landing_speed", "stride_time", "swing_apex")
         names += ("contact", "contact_share")
         results.append({name: getattr(footfalls, name)[foot].item() for name in names})
@@ -244,3 +247,30 @@ def test_a_saved_state_does_not_change_afterwards():
 def test_a_time_that_is_not_positive_is_refused_by_name(field):
     with pytest.raises(ValueError, match=f"footfall.{field}"):
         FootfallCfg(**{field: 0.0})
+
+
+def test_an_apex_is_above_the_highest_ground_that_the_swing_came_near():
+    found = GROUND + AIR * 4 + GROUND * 2
+    height = [0.0, 0.02, 0.12, 0.10, 0.09, 0.08, 0.08]
+    ground = [0.0, 0.0, 0.0, 0.08, 0.08, 0.08, 0.08]
+    results = _play(_make_footfalls(), found, clearance=height, ground=ground)
+    assert results[-1]["swing_apex"] == pytest.approx(0.04)
+    down = _play(_make_footfalls(), found, clearance=height[::-1], ground=ground[::-1])
+    assert down[-1]["swing_apex"] == pytest.approx(0.04)
+
+
+def test_a_swing_that_begins_with_an_episode_knows_of_none_before():
+    footfalls = _make_footfalls()
+    _play(footfalls, GROUND + AIR * 2, clearance=[0.0, 0.3, 0.3], ground=[0.2, 0.2, 0.2])
+    footfalls.reset(torch.tensor([True, False]), torch.zeros(2, 4))
+    results = _play(footfalls, AIR * 2, clearance=[0.05, 0.04])
+    assert results[-1]["swing_apex"] == pytest.approx(0.05)
+
+
+def test_an_earlier_versions_state_has_its_apex_above_level_ground():
+    footfalls, twin = _make_footfalls(), _make_footfalls()
+    _play(footfalls, GROUND + AIR * 2, clearance=[0.0, 0.03, 0.05])
+    earlier = {k: v for k, v in footfalls.state_dict().items() if not k.startswith("_highest")}
+    twin.load_state_dict(earlier)
+    for each in (footfalls, twin):
+        assert _play(each, AIR, clearance=[0.02])[0]["swing_apex"] == pytest.approx(0.05)

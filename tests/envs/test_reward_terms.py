@@ -80,7 +80,7 @@ CASES = {
         [11.0, 6.0],
     ),
     "foot_clearance": (
-        {"foot_height": [[0.04] * 4, [0.06] * 4], "foot_speed_xy": [[2.0], [2.0]]},
+        {"foot_lift": [[0.04] * 4, [0.06] * 4], "foot_speed_xy": [[2.0], [2.0]]},
         [0.0008, 0.0],
     ),
     "touchdown_apex": (
@@ -187,6 +187,7 @@ def test_a_parameter_changes_its_function(name, params, expected):
         stride_time=[[0.5], []],
         landing_speed=[[0.2], []],
         foot_height=[[0.1], []],
+        foot_lift=[[0.1], []],
         foot_drop_sq=[[3.0], []],
         foot_speed_xy=[[1.0], []],
     )

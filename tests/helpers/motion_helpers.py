@@ -24,6 +24,7 @@ WIDTHS = {
     "foot_raise_sq": 4,
     "foot_speed_xy": 4,
     "foot_height": 4,
+    "foot_lift": 4,
     "contact": 4,
     "touchdown": 4,
     "landing_speed": 4,

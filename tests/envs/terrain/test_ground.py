@@ -191,3 +191,17 @@ def test_a_kind_that_there_is_not_is_refused_with_those_that_there_are():
         TerrainCfg(first_levels=(0, 5))
     with pytest.raises(ValueError, match=r"env\.terrain\.first_levels"):
         TerrainCfg(first_levels=(3, 1))
+
+
+def test_the_highest_ground_near_a_foot_is_the_step_that_it_is_about_to_meet():
+    env = _env("stairs", 1, terrain=TerrainCfg(kind="stairs", first_levels=(2, 2)))
+    risers = torch.tensor([[1.2, 1.5, 1.8]])  # where the first steps of a flight begin
+    before = torch.stack((risers - 0.1, torch.zeros(1, 3)), dim=-1)
+    below = env.ground.below(before, torch.tensor([[1.6, 0.0]]))
+    torch.testing.assert_close(below.feet, torch.tensor([[0.0, 0.08, 0.16]]))
+    torch.testing.assert_close(below.near_feet, below.feet + 0.08)
+    torch.testing.assert_close(below.trunk, torch.tensor([0.16]))
+    far = env.ground.below(before - torch.tensor([0.1, 0.0]), torch.zeros(1, 2))
+    torch.testing.assert_close(far.near_feet, far.feet)
+    level = _env("flat", 1).ground.below(before, torch.zeros(1, 2))
+    assert not any(bool(heights.any()) for heights in level)

@@ -120,3 +120,43 @@ def test_commands_hold_longer_where_ground_has_levels_if_they_are_told_to():
     for robot in range(6):
         at = [step + 1 for step, robots in enumerate(changed) if robots[robot]]
         assert at == ([2, 4] if flat[robot] else [5])
+
+
+def test_who_walks_beside_stairs_has_crossed_none():
+    travelled = Travelled(2, torch.device("cpu"))
+    travelled.across = torch.tensor([True, False])
+    beside = torch.tensor([[0.5, 4.0], [0.5, 4.0]])
+    travelled.update(beside, torch.zeros(2, 4), torch.zeros(2, 3), 0.02)
+    torch.testing.assert_close(travelled.away, torch.tensor([0.5, beside[1].norm().item()]))
+
+
+def test_ground_that_is_crossed_along_x_is_that_which_robots_begin_along():
+    env = QuadrupedEnv(
+        QuadrupedEnvCfg(num_envs=30, num_threads=1, terrain=TerrainCfg(kind="rough"))
+    )
+    assert isinstance(env.ground, BoxGround)
+    along = {"slopes", "stairs", "stairs_down"}
+    for robot, across in enumerate(env.ground.across.tolist()):
+        assert across == (env.ground.kinds[int(env.ground.kind[robot])] in along)
+    assert torch.equal(env.travelled.across, env.ground.across)
+
+
+def test_commands_turn_less_where_ground_is_crossed_along_x_if_they_are_told_to():
+    def drawn(share: float) -> torch.Tensor:
+        cfg = QuadrupedEnvCfg(
+            num_envs=60,
+            num_threads=1,
+            terrain=TerrainCfg(kind="rough", turning_share=share),
+            commands=CommandsCfg(resampling_time=0.02, standing_fraction=0.0),
+        )
+        env = QuadrupedEnv(cfg)
+        env.step(torch.zeros(60, 12))
+        assert isinstance(env.ground, BoxGround)
+        return torch.cat((env.commands.command, env.ground.across[:, None]), dim=1)
+
+    all_of_it, less = drawn(1.0), drawn(0.25)
+    straight = all_of_it[:, 4] > 0.0
+    assert 0 < int(straight.sum()) < 60
+    torch.testing.assert_close(less[straight, 2], 0.25 * all_of_it[straight, 2])
+    assert torch.equal(less[~straight], all_of_it[~straight])
+    assert torch.equal(less[:, :2], all_of_it[:, :2])
