@@ -495,12 +495,13 @@ class QuadrupedEnv(VecEnv):
 
     def _steps_of_commands(self) -> torch.Tensor:
         """Return for how many steps each robot has the same command. Shape: (num_envs,)."""
-        time = torch.full((self.num_envs,), self._steps(self.cfg.commands.resampling_time))
+        usual = self._steps(self.cfg.commands.resampling_time)
+        time = torch.full((self.num_envs,), usual, device=self.device)
         longer = self.cfg.terrain.command_time
         if longer > 0.0:
             for robot, kind in enumerate(kind_of_robot(self.cfg.terrain, self.num_envs)):
                 time[robot] = time[robot] if kind == "flat" else self._steps(longer)
-        return time.to(self.device)
+        return time
 
     def _allocate(self) -> None:
         num_envs, device = self.num_envs, self.device

@@ -48,6 +48,8 @@ RULES: dict[str, Rule] = {
     "env.observations.scales": "kept",
     "env.observations.noise": "applied",
     "env.observations.noise_level": "applied",
+    "env.observations.sensors": "robots",
+    "env.observations.accelerometer_noise": "applied",
     "env.rewards": "applied",
     "env.randomization": "robots",  # drawn once, when the robots are made
     "env.randomization.push_interval": "applied",

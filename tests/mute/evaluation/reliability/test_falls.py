@@ -11,6 +11,9 @@ from mute.evaluation.reliability import falls
 from mute.evaluation.reliability.falls import measure_falls
 from mute.evaluation.usual_robots import under_conditions
 
+_CONTROLLER = "mute.controllers.learned.LearnedController"
+"""What drives the robots of a policy."""
+
 
 class _Notes(Standing):
     """Holds the stance, or tips over where beta is above a half, and notes the commands."""
@@ -28,7 +31,7 @@ class _Notes(Standing):
 
 def test_robots_that_fall_on_drawn_commands_are_counted(monkeypatch):
     notes: list[torch.Tensor] = []
-    monkeypatch.setattr(falls, "LearnedController", lambda policy, robots: _Notes(robots, notes))
+    monkeypatch.setattr(_CONTROLLER, lambda policy, robots: _Notes(robots, notes))
     monkeypatch.setattr(falls, "_EPISODE", 10.5)
     policy = under_conditions(make_random_policy())
     policy.cfg.env.commands.resampling_time = 3.0  # of the task; here a command holds for 10 s

@@ -20,11 +20,14 @@ from mute.evaluation.reliability.follows import (
 )
 from mute.evaluation.usual_robots import under_conditions
 
+_CONTROLLER = "mute.controllers.learned.LearnedController"
+"""What drives the robots of a policy."""
+
 
 @pytest.fixture
 def standing(monkeypatch: pytest.MonkeyPatch):
     """Return a policy under whose name robots hold the stance, for short trials."""
-    monkeypatch.setattr(follows, "LearnedController", lambda policy, robots: Standing(robots))
+    monkeypatch.setattr(_CONTROLLER, lambda policy, robots: Standing(robots))
     monkeypatch.setattr(follows, "_WALK_TIME", 2.5)
     monkeypatch.setattr(follows, "_RANGE_TIME", 1.5)
     monkeypatch.setattr(follows, "_CHANGES", 2)
@@ -60,7 +63,7 @@ def test_a_robot_that_falls_in_stop_and_go_is_counted_for_its_beta(standing, mon
             folded = torch.tensor((0.0, 0.0, 0.0, 0.0, 8.0, -8.0) * 2)
             return torch.where(quiet, folded, 0.0)
 
-    monkeypatch.setattr(follows, "LearnedController", lambda policy, robots: _Toppled(robots))
+    monkeypatch.setattr(_CONTROLLER, lambda policy, robots: _Toppled(robots))
     standing.cfg.env.max_tilt = 0.3  # who leans has fallen
     falls = stop_and_go_falls(standing, 2, 0, lambda work: None)
     assert falls == {0.0: 0.0, 1.0: 1.0}

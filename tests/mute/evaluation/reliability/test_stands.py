@@ -14,6 +14,9 @@ from mute.evaluation.reliability import stands
 from mute.evaluation.reliability.stands import Stillness, measure_stands
 from mute.evaluation.usual_robots import under_conditions
 
+_CONTROLLER = "mute.controllers.learned.LearnedController"
+"""What drives the robots of a policy."""
+
 
 class _Frames:
     """Stands in for an environment of two robots whose next steps are made by hand."""
@@ -67,7 +70,7 @@ def short(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_a_robot_that_holds_the_stance_stands_in_silence_and_takes_a_push(short, monkeypatch):
-    monkeypatch.setattr(stands, "LearnedController", lambda policy, robots: Standing(robots))
+    monkeypatch.setattr(_CONTROLLER, lambda policy, robots: Standing(robots))
     result = measure_stands(short, 6, 0, lambda work: None)
     for row in result.tables["stands"]:
         assert row["robots"] == 2

@@ -16,6 +16,10 @@ from mute.evaluation.reliability.starts import COMMANDS, going_times, starts_of
 from mute.evaluation.trials import evaluation_cfg, from_the_stance
 from mute.evaluation.usual_robots import under_conditions
 
+_CONTROLLER = "mute.controllers.learned.LearnedController"
+"""What drives the robots of a policy."""
+
+
 _DT = 0.02
 _STEPS = round(starts.TRIAL_TIME / _DT)
 
@@ -117,7 +121,7 @@ def test_randomised_robots_begin_in_the_exact_stance_that_their_sensors_see_with
         made.append(_Notes(robots))
         return made[-1]
 
-    monkeypatch.setattr(starts, "LearnedController", make)
+    monkeypatch.setattr(_CONTROLLER, make)
     monkeypatch.setattr(starts, "STAND_TIME", 0.1)
     monkeypatch.setattr(starts, "TRIAL_TIME", 0.6)
     policy = under_conditions(make_random_policy())
