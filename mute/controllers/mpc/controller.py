@@ -28,6 +28,8 @@ from .stand import Stand
 
 __all__ = ["MpcController"]
 
+Array = NDArray[np.floating]
+
 
 class MpcController:
     """Drives robots by forces that it plans ahead; keeps the past of each."""
@@ -72,18 +74,19 @@ class MpcController:
         now = self._senses.update(observations, self._stance)
         self._choose_stance(now)
         now = self._on_the_way(now)
-        walks, step_dt = self._clock.walks, self._cfg.step_dt
-        forces = self._planner.forces(now, self._clock, self._stance, step_dt)
+        clock, walks, step_dt = self._clock, self._clock.walks, self._cfg.step_dt
+        ground = ground_height(now.feet, self._stance)
+        landing = footholds(now, self._body, self._settings, clock.remaining(), ground)
+        forces = self._planner.forces(now, clock, self._stance, ground, landing, step_dt)
         forces = self._stand.update(now, walks, forces, step_dt)
         # Once it has landed a foot is on the ground, on hard floors with bounces.
         self._landed = self._stance & (self._landed | now.touching)
         sinking = self._settings.search_speed * (self._stance & ~self._landed & walks[:, None])
         targets = stance_targets(now, self._body, forces, sinking, self._ahead)
         if not walks.all():
-            still = np.repeat(~walks[:, None], len(LEGS), axis=1)
-            targets = targets.merged(self._stand.targets(now, targets, self._ahead), still)
+            targets = targets.merged(self._stand.targets(targets, self._ahead), ~walks[:, None])
         if not self._stance.all():
-            targets = targets.merged(self._swing(now), ~self._stance)
+            targets = targets.merged(self._swing(now, landing), ~self._stance)
         action = (set_points(targets, self._body) - self._body.stand) / self._cfg.action_scale
         return torch.from_numpy(action.reshape(self.num_envs, len(self._ahead), -1)).float()
 
@@ -106,15 +109,14 @@ class MpcController:
         self._asked += share * (now.command - self._asked)
         return dataclasses.replace(now, command=self._asked.copy())
 
-    def _swing(self, now: Moment) -> JointTargets:
-        clock, settings = self._clock, self._settings
-        ground = ground_height(now.feet, self._stance)
+    def _swing(self, now: Moment, landing: Array) -> JointTargets:
+        clock = self._clock
         return swing_targets(
             now,
             self._body,
             self._left_at,
-            footholds(now, self._body, settings, clock.remaining(), ground),
-            settings.swing_height,
+            landing,
+            self._settings.swing_height,
             clock.progress(self._ahead),
             clock.swing_time,
             self._ahead,

@@ -86,6 +86,7 @@ class ForceProgram:
         self._velocity_weights = np.array(cfg.angular_velocity_weights + cfg.velocity_weights)
         self._pose_pairs = self._to_pose.T @ self._to_pose
         self._velocity_pairs = self._to_velocity.T @ self._to_velocity
+        self._inverse_inertia = np.linalg.inv(body.inertia)
         self._bounds: dict[int, tuple[Array, Array, Array]] = {}
         self._time = dt * np.arange(1, steps + 1)
 
@@ -169,7 +170,7 @@ class ForceProgram:
 
     def _accelerations(self, feet: Array, turn: Array) -> Array:
         """Return what a newton at each foot does, along z, x and y. Shape: (n, 3 count, 6)."""
-        inverse = turn @ np.linalg.inv(self._body.inertia) @ turn.transpose(0, 2, 1)
+        inverse = turn @ self._inverse_inertia @ turn.transpose(0, 2, 1)
         robots, count = feet.shape[:2]
         moved = np.zeros((robots, 3, count, 6))
         for row, axis in enumerate((2, 0, 1)):

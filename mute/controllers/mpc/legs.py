@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .turning import packed
+from .turning import packed, wrapped
 
 __all__ = [
     "HIPS",
@@ -92,8 +92,7 @@ def joints_of_feet(feet: Array) -> Array:
     """
     x, y, z = np.moveaxis(feet - HIPS, -1, 0)
     down = -np.sqrt(np.maximum(y * y + z * z - OFFSETS**2, 0.0))
-    hip = np.arctan2(z, y) - np.arctan2(down, OFFSETS)
-    hip = (hip + np.pi) % (2.0 * np.pi) - np.pi
+    hip = wrapped(np.arctan2(z, y) - np.arctan2(down, OFFSETS))
     reach = np.clip(np.hypot(x, down), _SHORTEST, 2.0 * LINK * 0.999)
     calf = -np.arccos(np.clip(0.5 * (reach / LINK) ** 2 - 1.0, -1.0, 1.0))
     thigh = np.arctan2(-x, -down) - 0.5 * calf

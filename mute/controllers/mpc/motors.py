@@ -45,7 +45,7 @@ class JointTargets:
     """rad/s."""
 
     def merged(self, other: JointTargets, legs: NDArray[np.bool_]) -> JointTargets:
-        """Return these, with those of another for some legs. Shape: (n, 4)."""
+        """Return these, with those of another for some legs. Shape: (n, 4), or (n, 1) for all."""
         at = legs[:, None, :, None]
         return JointTargets(
             np.where(at, other.torque, self.torque),

@@ -97,8 +97,6 @@ class LegOdometry:
     def reset(self, robots: NDArray[np.bool_]) -> None:
         """Begin anew with what is measured next. Shape: (num_envs,)."""
         self._fresh |= robots
-        self._state[robots] = 0.0
-        self._covariance[robots] = 0.0
 
     def update(
         self,

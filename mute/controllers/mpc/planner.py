@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mute.envs.scene import FOOT_RADIUS
 
 from .body import Body
-from .footholds import footholds, ground_height
+from .footholds import footholds
 from .forces import ForceProgram, Outlook
 from .gait import TrotClock
 from .senses import Moment
@@ -33,13 +33,20 @@ class ForcePlanner:
         self._goal = np.zeros((num_envs, 3))
         self._fresh = np.ones(num_envs, dtype=bool)
         self._ends = cfg.horizon_step * np.arange(1, cfg.horizon + 1)
+        self._middles = self._ends - 0.5 * cfg.horizon_step
 
     def reset(self, robots: NDArray[np.bool_]) -> None:
         """Forget the past of some robots. Shape: (num_envs,)."""
         self._fresh |= robots
 
     def forces(
-        self, now: Moment, clock: TrotClock, stance: NDArray[np.bool_], step_dt: float
+        self,
+        now: Moment,
+        clock: TrotClock,
+        stance: NDArray[np.bool_],
+        ground: Array,
+        landing: Array,
+        step_dt: float,
     ) -> Array:
         """Return the forces of the ground on the feet until the next control step, N, world.
 
@@ -47,6 +54,8 @@ class ForcePlanner:
             now: What is known of n robots.
             clock: Their gait.
             stance: Which feet are to be on the ground. Shape: (n, 4).
+            ground: Height of their centres, m. Shape: (n,).
+            landing: Where the others land, m. Shape: (n, 4, 3).
             step_dt: Control period, s.
 
         Returns:
@@ -56,18 +65,17 @@ class ForcePlanner:
         com, velocity = now.place + arm, now.velocity + cross(now.ang_vel, arm)
         self._lead(now, com, clock, step_dt)
         heading = about_vertical(now.yaw)
-        ground = ground_height(now.feet, stance)
         turn = heading.transpose(0, 2, 1) @ now.turn
-        middles = self._ends - 0.5 * self._cfg.horizon_step
-        planned = clock.stance(middles)
+        planned = clock.stance(self._middles)
         planned[:, 0] = stance
-        arms = self._arms(now, com, clock, stance, ground)
+        arms = self._arms(now, com, clock, stance, ground, landing)
         rise = self._cfg.base_height - FOOT_RADIUS
+        path = self._curve(now.command * _LEVEL, now, self._ends)
         outlook = Outlook(
             pose=_pose(turn),
             velocity=np.concatenate((into(heading, now.ang_vel), into(heading, velocity)), axis=1),
-            pose_wanted=self._wanted(now, com, heading, ground + rise + arm[:, 2]),
-            velocity_wanted=self._rates(now),
+            pose_wanted=self._wanted(now, com, heading, ground + rise + arm[:, 2], path[0]),
+            velocity_wanted=self._rates(now, path[1]),
             feet=into(heading, arms),
             stance=planned,
             turn=turn,
@@ -87,21 +95,20 @@ class ForcePlanner:
         goal[:, :2] = com[:, :2] + np.clip(goal[:, :2] - com[:, :2], -most, most)
         goal[:, 2] = now.yaw + np.clip(wrapped(goal[:, 2] - now.yaw), -most, most)
 
-    def _wanted(self, now: Moment, com: Array, heading: Array, height: Array) -> Array:
+    def _wanted(self, now: Moment, com: Array, heading: Array, height: Array, way: Array) -> Array:
         """Return the pose at the end of each step, in the heading frame. Shape: (n, N, 6)."""
         wanted = np.zeros((len(com), len(self._ends), 6))
         wanted[..., 2] = (self._goal[:, 2] - now.yaw)[:, None] + now.command[:, 2:] * self._ends
         there = np.zeros_like(com)
         there[:, :2] = self._goal[:, :2] - com[:, :2]
-        way, _ = self._curve(now.command * _LEVEL, now, self._ends)
         wanted[..., 3:] = into(heading, there)[:, None] + way
         wanted[..., 5] = (height - com[:, 2])[:, None]
         return wanted
 
-    def _rates(self, now: Moment) -> Array:
+    def _rates(self, now: Moment, velocity: Array) -> Array:
+        """Return the velocities at the end of each step, likewise. Shape: (n, N, 6)."""
         rates = np.zeros((len(now.command), len(self._ends), 6))
         rates[..., 2] = now.command[:, 2:]
-        _, velocity = self._curve(now.command * _LEVEL, now, self._ends)
         rates[..., 3:] = velocity
         return rates
 
@@ -117,19 +124,18 @@ class ForcePlanner:
         clock: TrotClock,
         stance: NDArray[np.bool_],
         ground: Array,
+        landing: Array,
     ) -> Array:
         """Return from the centre of mass to each foot in the middle of each step, m, world.
 
         A foot that has not lifted by then is where it is; another where it will land.
         """
-        middles = self._ends - 0.5 * self._cfg.horizon_step
         lands = clock.remaining()
-        first = footholds(now, self._body, self._cfg, lands, ground)
         later = footholds(now, self._body, self._cfg, lands + clock.swing_time, ground)
-        lifted = clock.walks[:, None] & (middles > lands[:, None])
+        lifted = clock.walks[:, None] & (self._middles > lands[:, None])
         landed = np.where(lifted[:, :, None, None], later[:, None], now.feet[:, None])
-        feet = np.where(stance[:, None, :, None], landed, first[:, None])
-        path = com[:, None] + self._curve(now.asked, now, middles)[0]
+        feet = np.where(stance[:, None, :, None], landed, landing[:, None])
+        path = com[:, None] + self._curve(now.asked, now, self._middles)[0]
         return feet - path[:, :, None]
 
 

@@ -60,11 +60,10 @@ class Stand:
         self._forces += share * (forces - self._forces)
         return self._forces.copy()
 
-    def targets(self, now: Moment, pushing: JointTargets, ahead: Array) -> JointTargets:
+    def targets(self, pushing: JointTargets, ahead: Array) -> JointTargets:
         """Return what the legs of robots that stand are to do: hold their joints, and push.
 
         Args:
-            now: What is known of the robots.
             pushing: What they would do otherwise, whose torques hold the trunk up.
             ahead: Times from now, s. Shape: (steps,).
         """
