@@ -20,7 +20,7 @@ from mute.command_lines.arguments import (
     make_directory,
 )
 from mute.command_lines.policy_options import DriverArgs
-from mute.command_lines.sound_options import check_audible, progress_bar
+from mute.command_lines.sound_options import progress_bar
 from mute.controllers.driver import Driver
 from mute.evaluation.reliability.figures import Figure, PartResult, shown
 from mute.evaluation.reliability.parts import PARTS
@@ -161,10 +161,8 @@ def _print_starts(measured: _Measured) -> None:
 
 def _load(args: ReliabilityArgs) -> Driver:
     """Return the policy, which some parts need to be one that can be heard."""
-    driver = args.driver()
-    if any(PARTS[name].heard for name in args.parts):
-        check_audible(driver, args.driver_name)
-    return driver
+    heard = any(PARTS[name].heard for name in args.parts)
+    return args.audible_driver() if heard else args.driver()
 
 
 def _check(args: ReliabilityArgs) -> None:

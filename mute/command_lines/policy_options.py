@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Self
 
+from mute.acoustics.audible_env import listening_cfg
 from mute.acoustics.origin import policy_origin, sound_origin
 from mute.checkpoint import CheckpointError, latest_checkpoint, load_checkpoint
 from mute.command_lines.arguments import task_name
@@ -20,7 +21,7 @@ from mute.support.errors import MuteError
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK, make_task
 
-__all__ = ["DriverArgs", "PolicyArgs"]
+__all__ = ["DriverArgs", "PolicyArgs", "check_audible"]
 
 
 _SHIPPED = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
@@ -110,6 +111,16 @@ class DriverArgs(PolicyArgs):
         """
         return load_policy(self.policy) if self.controller == "policy" else self._mpc()
 
+    def audible_driver(self) -> Driver:
+        """Return what drives the robots, which can be heard, once it is found.
+
+        Raises:
+            MuteError: If it cannot be used, or acts at times that lie between the physics steps.
+        """
+        driver = self.driver()
+        check_audible(driver, self.driver_name)
+        return driver
+
     def _mpc(self) -> MpcDriver:
         settings = MpcCfg(true_velocity=self.controller == "mpc_true_velocity")
         return MpcDriver(settings=settings, task=self.controller)
@@ -133,6 +144,18 @@ class DriverArgs(PolicyArgs):
         settings = json.dumps(dataclasses.asdict(self._mpc().settings)).encode()
         digest = hashlib.sha256(settings).hexdigest()
         return {"policy": self.controller, "policy_sha256": digest}
+
+
+def check_audible(driver: Driver, name: str) -> None:
+    """Check that what drives robots can be heard.
+
+    Raises:
+        MuteError: If it acts at times that lie between the physics steps.
+    """
+    try:
+        listening_cfg(driver.cfg.env)
+    except ValueError as error:
+        raise MuteError(f"{name} cannot be heard: {error}") from error
 
 
 def _that_ships(task: str) -> Path:

@@ -15,14 +15,12 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from mute.acoustics import soundscape
-from mute.acoustics.audible_env import listening_cfg
 from mute.acoustics.microphone import Microphone
 from mute.acoustics.physics.room import ROOMS, Room
 from mute.acoustics.room_sound import check_rooms_heard
 from mute.command_lines.arguments import Words, check_distinct
-from mute.command_lines.policy_options import DriverArgs
+from mute.command_lines.policy_options import DriverArgs, check_audible
 from mute.controllers import load_policy
-from mute.controllers.driver import Driver
 from mute.controllers.learned import Policy
 from mute.rendering.kept_walks import KeptWalks
 from mute.support.errors import MuteError
@@ -33,7 +31,6 @@ __all__ = [
     "RoomName",
     "SoundArgs",
     "Sources",
-    "check_audible",
     "check_sources",
     "find_microphone",
     "find_room",
@@ -76,16 +73,6 @@ class SoundArgs(DriverArgs):
     sources: Sources = soundscape.SOURCES
     microphone: MicrophonePlace = "trunk"
     room: RoomName = "open"
-
-    def audible_driver(self) -> Driver:
-        """Return what drives the robots, which can be heard.
-
-        Raises:
-            MuteError: If it cannot be used, or acts at times that lie between the physics steps.
-        """
-        driver = self.driver()
-        check_audible(driver, self.driver_name)
-        return driver
 
     def check_sound(self, kept: Path | None = None) -> None:
         """Check --sources, --microphone and --room.
@@ -210,18 +197,6 @@ def load_audible_policy(path: Path) -> Policy:
     policy = load_policy(path)
     check_audible(policy, str(path))
     return policy
-
-
-def check_audible(driver: Driver, name: str) -> None:
-    """Check that what drives robots can be heard.
-
-    Raises:
-        MuteError: If it acts at times that lie between the physics steps.
-    """
-    try:
-        listening_cfg(driver.cfg.env)
-    except ValueError as error:
-        raise MuteError(f"{name} cannot be heard: {error}") from error
 
 
 @contextlib.contextmanager
