@@ -36,8 +36,7 @@ def specific_force(qpos: torch.Tensor, acceleration: torch.Tensor) -> torch.Tens
         acceleration: Of the trunk in the world, m/s^2. Shape: (n, 3).
     """
     up = acceleration.new_tensor((0.0, 0.0, GRAVITY))
-    nowhere = torch.zeros_like(acceleration)
-    return base_state(qpos, torch.cat((acceleration + up, nowhere), dim=1)).lin_vel
+    return (_rotation(qpos) * (acceleration + up)[:, :, None]).sum(dim=1)
 
 
 def base_state(qpos: torch.Tensor, qvel: torch.Tensor) -> BaseState:
@@ -47,16 +46,7 @@ def base_state(qpos: torch.Tensor, qvel: torch.Tensor) -> BaseState:
         qpos: Generalised positions, those of the trunk's free joint first. Shape: (num_envs, nq).
         qvel: Generalised velocities, likewise. Shape: (num_envs, nv).
     """
-    w, x, y, z = qpos[:, 3:7].unbind(dim=1)
-    # Rows of the rotation matrix from body to world; columns are the world's axes seen by it.
-    rotation = torch.stack(
-        (
-            1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
-            2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
-            2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
-        ),
-        dim=1,
-    ).view(-1, 3, 3)  # fmt: skip
+    rotation = _rotation(qpos)
     heading = rotation[:, :2, 0]
     return BaseState(
         pos=qpos[:, :3],
@@ -67,3 +57,16 @@ def base_state(qpos: torch.Tensor, qvel: torch.Tensor) -> BaseState:
         projected_gravity=-rotation[:, 2],
         heading=heading / torch.hypot(*heading.unbind(dim=1)).clamp(min=1e-6)[:, None],
     )
+
+
+def _rotation(qpos: torch.Tensor) -> torch.Tensor:
+    """Return the rotation from body to world: rows are its axes seen by the body. (n, 3, 3)."""
+    w, x, y, z = qpos[:, 3:7].unbind(dim=1)
+    return torch.stack(
+        (
+            1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
+            2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
+            2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
+        ),
+        dim=1,
+    ).view(-1, 3, 3)  # fmt: skip

@@ -191,11 +191,11 @@ class Footfalls:
 
     def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
         """Continue from a `state_dict`."""
+        apex = state["swing_apex"]
+        # Earlier versions have an apex above level ground alone.
+        state = {"_highest": apex, "_highest_ground": torch.zeros_like(apex)} | state
         for name in _STATE_TENSORS:
-            # Earlier versions have an apex above level ground alone.
-            value = state.get(name, state["swing_apex"] if name == "_highest" else None)
-            value = torch.zeros_like(self.swing_apex) if value is None else value
-            setattr(self, name, value.to(self._drop.device, copy=True))
+            setattr(self, name, state[name].to(self._drop.device, copy=True))
         prefix = "contacts/"
         contacts = {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}
         self._contacts.load_state_dict(contacts)

@@ -15,10 +15,11 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from .base_state import base_state, specific_force
+from .base_state import base_state
 from .commands import CommandSampler
 from .curriculum import Curriculum, curriculum
 from .engines import make_simulation
+from .extra_sensors import ExtraSensors
 from .following import FollowedVelocity
 from .footfall import Footfalls
 from .initial_state import NUM_DRAWS, place
@@ -95,6 +96,9 @@ class QuadrupedEnv(VecEnv):
         """Randomised physics as the critic sees it. Shape: (num_envs, PHYSICS_DIM)."""
         self.encoder_offset, self.imu = drawn.encoder_offset, drawn.imu
         self._sensors = RobotSensors(self.simulation)
+        self._extra_sensors = None
+        if cfg.observations.sensors:
+            self._extra_sensors = ExtraSensors(self.simulation, self._sensors, cfg.step_dt)
         self.grid = cfg.height_map.grid(self.device)
         """Points of the height map in the heading frame, m. Shape: (num_heights, 2)."""
         self.ground = self._make_ground()
@@ -217,8 +221,8 @@ class QuadrupedEnv(VecEnv):
         state["travelled"] = self.travelled.state_dict()
         if isinstance(self.ground, BoxGround):
             state["ground"] = self.ground.state_dict()
-        if self.cfg.observations.sensors:
-            state |= {name: getattr(self, name).clone() for name in _SENSED}
+        if self._extra_sensors is not None:
+            state["extra_sensors"] = self._extra_sensors.state_dict()
         state["encoder_offset"] = self.encoder_offset.clone()
         state["imu"] = None if self.imu is None else self.imu.clone()
         state["observations"] = {key: value.clone() for key, value in self._observations.items()}
@@ -233,8 +237,8 @@ class QuadrupedEnv(VecEnv):
         self.simulation.load_state_dict(state["simulation"])
         for name in _STATE_TENSORS:
             setattr(self, name, state[name].to(self.device, copy=True))
-        for name in _SENSED if self.cfg.observations.sensors else ():
-            setattr(self, name, state[name].to(self.device, copy=True))
+        if self._extra_sensors is not None:
+            self._extra_sensors.load_state_dict(state["extra_sensors"])
         self.step_count = state["step_count"]
         self.unstable_count = state["unstable_count"]
         self.commands.command.copy_(state["command"])
@@ -276,8 +280,8 @@ class QuadrupedEnv(VecEnv):
         torch.add(exact, self.action, alpha=self.cfg.action_scale, out=simulation.ctrl)
         if isinstance(self.ground, BoxGround):
             self.ground.lay(simulation.qpos[:, :2])
-        if self.cfg.observations.sensors:
-            self._lin_vel_before = simulation.qvel[:, :3].clone()
+        if self._extra_sensors is not None:
+            self._extra_sensors.begin()
         ctrl = None
         if self._actions.dim() == 3:
             ctrl = exact[:, None] + self.cfg.action_scale * self._actions
@@ -285,10 +289,9 @@ class QuadrupedEnv(VecEnv):
         for listener in self.physics_listeners:
             listener()
         sensors = self._sensors
-        contact = sensors.foot_contact_substeps
-        self.footfalls.record(sensors.foot_vel_z_substeps, contact)
-        if self.cfg.observations.sensors:
-            self._contact_share = (contact > 0.0).float().mean(dim=0)
+        self.footfalls.record(sensors.foot_vel_z_substeps, sensors.foot_contact_substeps)
+        if self._extra_sensors is not None:
+            self._extra_sensors.end()
         self.unstable = simulation.unstable()
         if bool(self.unstable.any()):
             # Reset before anything is read, so that no NaN reaches a reward or an average.
@@ -368,10 +371,8 @@ class QuadrupedEnv(VecEnv):
         for name in _PAST:
             setattr(self, name, getattr(self, name).masked_fill(mask.unsqueeze(1), 0.0))
         self.episode_length_buf = self.episode_length_buf.masked_fill(mask, 0)
-        begun = self.simulation.qvel[:, :3]
-        self._lin_vel_before = torch.where(mask[:, None], begun, self._lin_vel_before)
-        contact = (self._sensors.foot_contact > 0.0).float()
-        self._contact_share = torch.where(mask[:, None], contact, self._contact_share)
+        if self._extra_sensors is not None:
+            self._extra_sensors.reset(mask)
         self._read_state()
 
     def _lift_to_ground(self, mask: torch.Tensor) -> None:
@@ -426,14 +427,10 @@ class QuadrupedEnv(VecEnv):
         return max(1, round(interval / self.step_dt))
 
     def _observe(self) -> None:
-        ang_vel, gravity = self.base_ang_vel, self.projected_gravity
-        if self.imu is not None:
-            ang_vel = (self.imu * ang_vel[:, None]).sum(dim=2)
-            gravity = (self.imu * gravity[:, None]).sum(dim=2)
         policy = policy_observation(
             self.cfg.observations.scales,
-            ang_vel,
-            gravity,
+            self._by_imu(self.base_ang_vel),
+            self._by_imu(self.projected_gravity),
             self.joint_pos + self.encoder_offset,
             self.joint_vel,
             self.action,
@@ -448,19 +445,17 @@ class QuadrupedEnv(VecEnv):
             self.base_lin_vel, heights, feet.raw_contact, feet.phase, self.physics
         )
         groups = {"policy": policy, "privileged": privileged}
-        if self.cfg.observations.sensors:
-            groups["sensors"] = self._sensor_observation()
+        if self._extra_sensors is not None:
+            force, contact = self._extra_sensors.read()
+            observed = self.cfg.observations
+            noise = observed.noise_level * observed.accelerometer_noise
+            force = self._by_imu(force) + noise * self._draw(self.num_envs, 3)
+            groups["sensors"] = torch.cat((force, contact), dim=1)
         self._observations = TensorDict(groups, batch_size=[self.num_envs])
 
-    def _sensor_observation(self) -> torch.Tensor:
-        observations = self.cfg.observations
-        change = self.simulation.qvel[:, :3] - self._lin_vel_before
-        force = specific_force(self.simulation.qpos, change / self.step_dt)
-        if self.imu is not None:
-            force = (self.imu * force[:, None]).sum(dim=2)
-        noise = observations.noise_level * observations.accelerometer_noise
-        force = force + noise * self._draw(self.num_envs, 3)
-        return torch.cat((force, self._contact_share), dim=1)
+    def _by_imu(self, vectors: torch.Tensor) -> torch.Tensor:
+        """Return vectors of the body frame as the inertial sensor has them. (num_envs, 3)."""
+        return vectors if self.imu is None else (self.imu * vectors[:, None]).sum(dim=2)
 
     def _log(
         self, shares: dict[str, torch.Tensor], factors: Curriculum, dones: torch.Tensor
@@ -497,10 +492,11 @@ class QuadrupedEnv(VecEnv):
         """Return for how many steps each robot has the same command. Shape: (num_envs,)."""
         usual = self._steps(self.cfg.commands.resampling_time)
         time = torch.full((self.num_envs,), usual, device=self.device)
-        longer = self.cfg.terrain.command_time
-        if longer > 0.0:
-            for robot, kind in enumerate(kind_of_robot(self.cfg.terrain, self.num_envs)):
-                time[robot] = time[robot] if kind == "flat" else self._steps(longer)
+        longer, ground = self.cfg.terrain.command_time, self.ground
+        if longer > 0.0 and isinstance(ground, BoxGround):
+            has_levels = [name != "flat" for name in ground.kinds]
+            with_levels = torch.tensor(has_levels, device=self.device)[ground.kind]
+            time = torch.where(with_levels, self._steps(longer), time)
         return time
 
     def _allocate(self) -> None:
@@ -517,8 +513,6 @@ class QuadrupedEnv(VecEnv):
         """Robots whose action in it held NaN, taken for 0, or infinity, taken for the clip.
         Shape: (num_envs,), bool."""
         self.power = torch.zeros(num_envs, device=device)
-        self._lin_vel_before = torch.zeros(num_envs, 3, device=device)
-        self._contact_share = torch.zeros(num_envs, len(LEGS), device=device)
         self.step_count = 0
         self.unstable_count = 0
         self._estimated_phase = torch.zeros(num_envs, len(LEGS), device=device)
@@ -536,5 +530,4 @@ def scene_of(cfg: QuadrupedEnvCfg) -> SceneCfg:
 
 
 _PAST = ("action", "last_action", "action_before_last", "last_joint_vel")
-_SENSED = ("_lin_vel_before", "_contact_share")
 _STATE_TENSORS = (*_PAST, "episode_length_buf", "_estimated_phase", "physics")

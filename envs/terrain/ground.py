@@ -68,8 +68,7 @@ class Ground(ABC):
         Returns:
             Shape: (n, spheres).
         """
-        corners = feet[:, :, None] + radius * feet.new_tensor(_CORNERS)
-        return self.height(corners, robots).amax(dim=2)
+        return self.height(_corners(feet, radius), robots).amax(dim=2)
 
     def below(self, feet: torch.Tensor, trunk: torch.Tensor) -> Below:
         """Return the heights of the ground below a robot, all looked up at once.
@@ -79,7 +78,7 @@ class Ground(ABC):
             trunk: Likewise. Shape: (num_envs, 2).
         """
         count = feet.shape[1]
-        around = feet[:, :, None] + _NEAR * feet.new_tensor(_CORNERS)
+        around = _corners(feet, _NEAR)
         # To look up twenty heights takes hardly longer than one.
         points = torch.cat((feet, trunk[:, None], around.flatten(1, 2)), dim=1)
         heights = self.height(points)
@@ -114,7 +113,10 @@ class Ground(ABC):
         return base_pos[:, 2:3] - self.height(base_pos[:, None, :2] + offset)
 
 
-_CORNERS = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
+def _corners(centres: torch.Tensor, radius: float) -> torch.Tensor:
+    """Return the corners of squares around places. Shape: (n, squares, 2) -> (n, squares, 4, 2)."""
+    signs = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
+    return centres[:, :, None] + radius * centres.new_tensor(signs)
 
 
 _NEAR = 0.12
