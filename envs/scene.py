@@ -146,6 +146,12 @@ class SceneCfg:
     """Boxes for ground of its own under each robot, which stand on the floor; as many as the kind
     of ground takes (`envs.terrain`), unless there are to be more."""
 
+    stiffness: float = 20.0
+    """Kp of the joints' position controllers, N m/rad."""
+
+    damping: float = 0.5
+    """Kd of the joints' position controllers, N m s/rad."""
+
     longest_delay: float = 0.0
     """Longest time from an action to its set points that a motor can have, s; as long as the
     randomisation may draw, unless it is to be longer."""
@@ -176,6 +182,8 @@ _SCENE_RANGES = {
     "ls_iterations": Range(1, 10**6, whole=True),
     "floor_friction": Range(0.0, 10.0, above=True),
     "ground_boxes": Range(0, 1000, whole=True),
+    "stiffness": Range(0.0, 1e4, above=True),
+    "damping": Range(0.0, 1e3),
     "longest_delay": Range(0.0, 1.0),
 }
 
@@ -207,6 +215,7 @@ def make_spec(cfg: SceneCfg, pictured: bool = True) -> mujoco.MjSpec:
     spec = mujoco.MjSpec.from_file(str(_ROBOT_FILE))
     spec.modelname = "go1_scene"
     _set_options(spec, cfg)
+    _set_gains(spec, cfg)
     if pictured:
         _add_surroundings(spec)
     else:
@@ -225,6 +234,13 @@ def make_spec(cfg: SceneCfg, pictured: bool = True) -> mujoco.MjSpec:
     if pictured and cfg.look == "menagerie":
         dress_in_menagerie(spec)
     return spec
+
+
+def _set_gains(spec: mujoco.MjSpec, cfg: SceneCfg) -> None:
+    """Set the gains of the joints' position controllers."""
+    for actuator in spec.actuators:
+        actuator.gainprm[0] = cfg.stiffness
+        actuator.biasprm[1:3] = -cfg.stiffness, -cfg.damping
 
 
 def _require_solref(name: str, solref: tuple[float, float], timestep: float | None = None) -> None:

@@ -45,6 +45,9 @@ class EstimationCfg:
     """Bound on the gradient's norm."""
     actor_uses_phase: bool = True
     """Whether the group `estimate` holds the phase; False is the paper's exact actor."""
+    adaptive_bootstrap: bool = False
+    """Whether actor and critic see the true velocity in place of the estimate for some robots, the
+    fewer the more alike the returns of all are (DreamWaQ's); by default they see estimates."""
 
     def __post_init__(self) -> None:
         """Check the fields.
@@ -146,6 +149,8 @@ class AgentCfg:
     leading_side: bool = False
     """Whether symmetric networks may begin a step with one side, always the same: a robot that
     stands level and still is its own mirror image, and no trot is."""
+    quiet_factor: bool = True
+    """Whether the networks see beta; DreamWaQ's observation has none."""
     go_signal: bool = False
     """Whether actor and critic see, beside the command, whether it is one to move: a step is taken
     whole or not at all, at 0.1 m/s as at 1, and a network that sees 0.1 as next to nothing
@@ -201,6 +206,7 @@ class AgentCfg:
             "critic_hidden": self.critic_hidden,
             "estimation.network.lstm_hidden": (network.lstm_hidden,),
             "estimation.network.latent_dim": (network.latent_dim,),
+            "estimation.network.history_hidden": network.history_hidden,
             "estimation.network.decoder_hidden": network.decoder_hidden,
             "estimation.network.phase_hidden": network.phase_hidden,
         }
@@ -250,7 +256,8 @@ class TaskCfg:
         """Check what neither part can know alone.
 
         Raises:
-            ValueError: If mini-batches would be empty, or left and right cannot be treated alike.
+            ValueError: If mini-batches would be empty, nobody estimates the phase that is rewarded
+                by, or left and right cannot be treated alike.
         """
         num_envs, agent = self.env.num_envs, self.agent
         samples = num_envs * agent.num_steps_per_env
@@ -265,6 +272,11 @@ class TaskCfg:
                 "agent.estimation.num_mini_batches must be <= the number of robots learnt from, "
                 f"env.num_envs * agent.estimation.robots_share or {robots}, "
                 f"got {agent.estimation.num_mini_batches}"
+            )
+        if not agent.estimation.network.phase and self.env.rewards.phase_source == "estimated":
+            raise ValueError(
+                "env.rewards.phase_source must be 'true' without agent.estimation.network.phase, "
+                "got 'estimated'"
             )
         low, high = self.env.randomization.com_offset
         if agent.symmetric and low != -high:

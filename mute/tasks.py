@@ -13,6 +13,7 @@ from mute.envs.commands import CommandsCfg
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
 from mute.envs.rewards import RewardsCfg, RewardTermCfg, paper_terms, reward_term
+from mute.networks.estimator import EstimatorCfg
 from mute.support.errors import MuteError
 
 __all__ = ["DEFAULT_TASK", "make_task", "register_task", "task_names"]
@@ -78,6 +79,53 @@ def _go1_mute() -> TaskCfg:
     )
 
 
+def _go1_dreamwaq() -> TaskCfg:
+    """Return DreamWaQ on the same robot: its networks, rewards and ranges, and no quiet factor.
+
+    Source: Nahrendra et al., ICRA 2023 (arXiv 2301.10602). Its gains, 28 and 0.7, are
+    `env.scene.stiffness` and `damping`; its ground is `env.terrain.kind` rough.
+    """
+    rewards = RewardsCfg(terms=_dreamwaq_terms(), phase_source="true")
+    commands = CommandsCfg(lin_vel_y=(-1.0, 1.0), beta=(0.0, 0.0))
+    randomization = RandomizationCfg(
+        friction_factor=(0.25, 1.5625),  # 0.2 to 1.25 on a floor of 0.8
+        added_mass=(-1.0, 2.0),
+        com_offset=(-0.05, 0.05),
+        gain_scale=(0.9, 1.1),
+        motor_strength=(0.9, 1.1),
+        action_delay=(0.0, 0.015),
+    )
+    network = EstimatorCfg(
+        encoder="history",
+        heights=False,
+        phase=False,
+        decodes_velocity=True,
+        decoder_hidden=(64, 128),
+    )
+    agent = AgentCfg(
+        iterations=750,
+        actor_hidden=(512, 256, 128),
+        critic_hidden=(512, 256, 128),
+        quiet_factor=False,
+        estimation=EstimationCfg(network=network, adaptive_bootstrap=True),
+    )
+    return TaskCfg(
+        env=QuadrupedEnvCfg(rewards=rewards, randomization=randomization, commands=commands),
+        agent=agent,
+    )
+
+
+def _dreamwaq_terms() -> dict[str, RewardTermCfg]:
+    """Return DreamWaQ's Table I: the paper's without phase and collision, and three of its own."""
+    without = ("foot_drop_velocity", "foot_raise_velocity", "collision")
+    terms = {name: term for name, term in paper_terms().items() if name not in without}
+    return terms | {
+        "foot_clearance": reward_term("foot_clearance", -0.01, group="other"),
+        "smoothness": reward_term("smoothness", -0.01),
+        "power_distribution": reward_term("power_distribution", -1.0e-5),
+    }
+
+
 def _following() -> dict[str, RewardTermCfg]:
     """Return what a command earns beside the paper's terms: as much at 0.1 m/s as at 1."""
     return {
@@ -129,6 +177,7 @@ def _upright() -> dict[str, RewardTermCfg]:
 _TASKS: dict[str, Callable[[], TaskCfg]] = {
     "go1_mute": _go1_mute,
     "go1_mute_paper": _go1_mute_paper,
+    "go1_dreamwaq": _go1_dreamwaq,
 }
 
 

@@ -1,5 +1,6 @@
 """Torch modules of the method; they know nothing of environments."""
 
-from .estimator import Estimate, Estimator, EstimatorCfg, State
+from .encoders import State
+from .estimator import Estimate, Estimator, EstimatorCfg
 
 __all__ = ["Estimate", "Estimator", "EstimatorCfg", "State"]

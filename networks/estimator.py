@@ -1,38 +1,51 @@
 """The estimator: from the history of observations to what the robot cannot measure.
 
-An LSTM turns the proprioceptive history into body velocity, terrain heights, a latent and the phase
-of each foot. This module is the network alone; its labels, losses and optimiser are left to others.
+An encoder turns the proprioceptive history into body velocity, terrain heights, a latent and the
+phase of each foot. This module is the network alone; its labels, losses and optimiser are left to
+others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import torch
 from torch import Tensor, nn
 
-from mute.support.precision import hidden_layers
 from mute.support.ranges import Range, check_ranges
 
-from .reflection import Reflection, tie_layer, tie_mlp, tie_vector
+from .encoders import Encoder, HistoryEncoder, LstmEncoder, State
+from .perceptron import ACTIVATIONS, Activation, perceptron
+from .reflection import Reflection, tie_mlp
 
-__all__ = ["Estimate", "Estimator", "EstimatorCfg", "State"]
+__all__ = ["Estimate", "Estimator", "EstimatorCfg"]
 
-State = tuple[Tensor, Tensor]
-"""Hidden and cell state of the LSTM, each of shape (N, lstm_hidden)."""
-
-_ACTIVATIONS: dict[str, type[nn.Module]] = {"elu": nn.ELU, "relu": nn.ReLU, "tanh": nn.Tanh}
 _LOG_VAR_RANGE = (-10.0, 5.0)
 
 
 @dataclass
 class EstimatorCfg:
-    """Sizes of the estimator."""
+    """What is estimated, from what, and by networks of which sizes."""
+
+    encoder: Literal["lstm", "history"] = "lstm"
+    """What turns observations into what the heads read: an LSTM (the paper's), or a perceptron over
+    the last few (DreamWaQ's)."""
 
     lstm_hidden: int = 128
     """Width of the LSTM's hidden state."""
+
+    history_length: int = 5
+    """Number of observations that the other encoder sees."""
+
+    history_hidden: tuple[int, ...] = (128, 64)
+    """Widths of its layers."""
+
+    heights: bool = True
+    """Whether the terrain heights are estimated."""
+
+    phase: bool = True
+    """Whether the phase of the feet is estimated."""
 
     latent_dim: int = 16
     """Size of the latent z."""
@@ -40,25 +53,32 @@ class EstimatorCfg:
     decoder_hidden: tuple[int, ...] = (64,)
     """Widths of the hidden layers of the decoder that predicts the next observation."""
 
+    decodes_velocity: bool = False
+    """Whether the decoder sees the estimated velocity beside the latent, as DreamWaQ's does."""
+
     phase_hidden: tuple[int, ...] = (64,)
     """Widths of the hidden layers of the phase network."""
 
-    activation: Literal["elu", "relu", "tanh"] = "elu"
-    """Activation of the decoder and of the phase network."""
+    activation: Activation = "elu"
+    """Activation of the perceptrons."""
 
     def __post_init__(self) -> None:
         """Check the values.
 
         Raises:
-            ValueError: If a size is not positive, or the activation is unknown.
+            ValueError: If a size is not positive, or a name unknown.
         """
         width = Range(1, 16384, whole=True)
-        names = ("lstm_hidden", "latent_dim", "decoder_hidden", "phase_hidden")
-        check_ranges(self, "network", dict.fromkeys(names, width))
-        if self.activation not in _ACTIVATIONS:
-            raise ValueError(
-                f"network.activation must be one of {list(_ACTIVATIONS)}, got {self.activation!r}"
-            )
+        names = ("lstm_hidden", "history_hidden", "latent_dim", "decoder_hidden", "phase_hidden")
+        lengths = {"history_length": Range(1, 1000, whole=True)}
+        check_ranges(self, "network", dict.fromkeys(names, width) | lengths)
+        if not self.history_hidden:
+            raise ValueError("network.history_hidden must be one width at least, got ()")
+        known = {"encoder": ["lstm", "history"], "activation": list(ACTIVATIONS)}
+        for name, values in known.items():
+            value = getattr(self, name)
+            if value not in values:
+                raise ValueError(f"network.{name} must be one of {values}, got {value!r}")
 
 
 class Estimate(NamedTuple):
@@ -68,7 +88,8 @@ class Estimate(NamedTuple):
     """Linear velocity of the base, in the frame of its label, in m/s. Last dimension: 3."""
 
     heights: Tensor
-    """Height of the trunk above each point of the grid, in m. Last dimension: num_heights."""
+    """Height of the trunk above each point of the grid, in m. Last dimension: num_heights, 0 where
+    none are estimated."""
 
     latent_mean: Tensor
     """Mean of the latent. Last dimension: latent_dim."""
@@ -80,19 +101,20 @@ class Estimate(NamedTuple):
     """The latent in use: its mean, or a sample in training. Last dimension: latent_dim."""
 
     phase: Tensor
-    """Phase of each foot, within [0, 1]. Last dimension: num_feet."""
+    """Phase of each foot, within [0, 1]. Last dimension: num_feet, 0 where none is estimated."""
 
 
 class Estimator(nn.Module):
-    """LSTM encoder with heads for velocity, heights and a latent, a decoder and a phase network.
+    """Encoder with heads for velocity, heights and a latent, a decoder and a phase network.
 
-    The heads read the LSTM's hidden state. The decoder predicts the next observation from the
-    latent alone; the phase network is fed by the estimated heights (normalised), velocity and
-    latent, and its gradient flows through them into the encoder, so that all losses shape it.
-    Acting uses the mean of the latent, never a sample: a stored rollout that is unrolled again
-    gives the same estimates.
+    The heads read the encoder's features. The decoder predicts the next observation from the
+    latent, in the paper alone; the phase network is fed by the estimated heights (normalised),
+    velocity and latent, and its gradient flows through them into the encoder, so that all losses
+    shape it. Acting uses the mean of the latent, never a sample: a stored rollout that is unrolled
+    again gives the same estimates.
 
-    Source: MUTE, section "Phase Estimation".
+    Source: MUTE, section "Phase Estimation"; with a history, without heights and phase, and with
+    the velocity decoded, the context-aided estimator of DreamWaQ (Nahrendra et al., 2023).
     """
 
     def __init__(
@@ -108,24 +130,43 @@ class Estimator(nn.Module):
 
         Args:
             obs_dim: Size of an observation.
-            num_heights: Number of points of the height map.
+            num_heights: Number of points of the height map, if heights are estimated.
             cfg: Sizes; the defaults if left out.
-            num_feet: Number of feet.
+            num_feet: Number of feet, if their phase is estimated.
             height_offset: Height for which the height head gives 0, m; the environment's.
             height_scale: Difference in height for which it gives 1, m; the environment's.
         """
         super().__init__()
         self.height_offset, self.height_scale = height_offset, height_scale
         self.cfg = cfg = cfg if cfg is not None else EstimatorCfg()
-        self.lstm = nn.LSTMCell(obs_dim, cfg.lstm_hidden)
-        self.base_lin_vel_head = nn.Linear(cfg.lstm_hidden, 3)
-        self.heights_head = nn.Linear(cfg.lstm_hidden, num_heights)
-        self.latent_mean_head = nn.Linear(cfg.lstm_hidden, cfg.latent_dim)
-        self.latent_log_var_head = nn.Linear(cfg.lstm_hidden, cfg.latent_dim)
-        activation = _ACTIVATIONS[cfg.activation]
-        self.decoder = _mlp(cfg.latent_dim, cfg.decoder_hidden, obs_dim, activation)
-        phase_inputs = num_heights + 3 + cfg.latent_dim
-        self.phase_network = _mlp(phase_inputs, cfg.phase_hidden, num_feet, activation)
+        self.obs_dim = obs_dim
+        self.num_heights = num_heights if cfg.heights else 0
+        self.num_feet = num_feet if cfg.phase else 0
+        # Weights are saved under the encoder's name.
+        if cfg.encoder == "lstm":
+            self.lstm = LstmEncoder(obs_dim, cfg.lstm_hidden)
+        else:
+            self.history = HistoryEncoder(
+                obs_dim, cfg.history_length, cfg.history_hidden, cfg.activation
+            )
+        features = self.encoder.features
+        self.base_lin_vel_head = nn.Linear(features, 3)
+        self.heights_head = nn.Linear(features, num_heights) if cfg.heights else None
+        self.latent_mean_head = nn.Linear(features, cfg.latent_dim)
+        self.latent_log_var_head = nn.Linear(features, cfg.latent_dim)
+        decoded = cfg.latent_dim + (3 if cfg.decodes_velocity else 0)
+        self.decoder = perceptron(decoded, cfg.decoder_hidden, obs_dim, cfg.activation)
+        phase_inputs = self.num_heights + 3 + cfg.latent_dim
+        self.phase_network = (
+            perceptron(phase_inputs, cfg.phase_hidden, num_feet, cfg.activation)
+            if cfg.phase
+            else None
+        )
+
+    @property
+    def encoder(self) -> Encoder:
+        """What turns observations into features."""
+        return self.lstm if self.cfg.encoder == "lstm" else self.history
 
     def tie(
         self,
@@ -145,28 +186,26 @@ class Estimator(nn.Module):
         Raises:
             ValueError: If the width of a layer is odd.
         """
-        hidden = Reflection.swapped(self.cfg.lstm_hidden)
+        features = self.encoder.tie(obs)
         latent = Reflection.swapped(self.cfg.latent_dim)
-        gates = Reflection.joined([hidden] * 4)
-        tie_layer(self.lstm.weight_ih, obs, gates)
-        tie_layer(self.lstm.weight_hh, hidden, gates)
-        tie_vector(self.lstm.bias_ih, gates)
-        tie_vector(self.lstm.bias_hh, gates)
-        tie_mlp(self.base_lin_vel_head, hidden, base_lin_vel)
-        tie_mlp(self.heights_head, hidden, heights)
-        tie_mlp(self.latent_mean_head, hidden, latent)
-        tie_mlp(self.latent_log_var_head, hidden, latent)
-        tie_mlp(self.decoder, latent, obs)
-        tie_mlp(self.phase_network, Reflection.joined([heights, base_lin_vel, latent]), feet)
+        tie_mlp(self.base_lin_vel_head, features, base_lin_vel)
+        tie_mlp(self.latent_mean_head, features, latent)
+        tie_mlp(self.latent_log_var_head, features, latent)
+        velocity = [base_lin_vel] if self.cfg.decodes_velocity else []
+        tie_mlp(self.decoder, Reflection.joined([*velocity, latent]), obs)
+        if self.heights_head is not None:
+            tie_mlp(self.heights_head, features, heights)
+        if self.phase_network is not None:
+            seen = [heights] if self.cfg.heights else []
+            tie_mlp(self.phase_network, Reflection.joined([*seen, base_lin_vel, latent]), feet)
 
     def initial_state(self, num_envs: int, device: torch.device | str | None = None) -> State:
         """Return the zero state; it lies with the weights unless another device is given."""
-        weight = self.lstm.weight_hh
-        shape = (num_envs, self.cfg.lstm_hidden)
+        weight = self.base_lin_vel_head.weight
         device = weight.device if device is None else device
-        return (
-            torch.zeros(shape, dtype=weight.dtype, device=device),
-            torch.zeros(shape, dtype=weight.dtype, device=device),
+        return tuple(
+            torch.zeros(num_envs, size, dtype=weight.dtype, device=device)
+            for size in self.encoder.state_sizes.values()
         )
 
     def step(self, obs: Tensor, state: State) -> tuple[Estimate, State]:
@@ -177,10 +216,10 @@ class Estimator(nn.Module):
 
         Args:
             obs: Observations. Shape: (N, obs_dim).
-            state: Hidden and cell state. Shapes: (N, lstm_hidden).
+            state: What the encoder remembers. Shapes: (N, .).
         """
-        state = self._consume(obs, state)
-        return self._heads(state[0]), state
+        features, state = self.encoder.step(obs, state)
+        return self._heads(features), state
 
     def unroll(
         self,
@@ -194,7 +233,7 @@ class Estimator(nn.Module):
 
         Args:
             obs: Observations. Shape: (T, N, obs_dim).
-            state: Hidden and cell state before the first observation. Shapes: (N, lstm_hidden).
+            state: What the encoder remembers before the first observation. Shapes: (N, .).
             starts: True where an episode begins: the state is zeroed before that observation is
                 consumed.
                 Shape: (T, N), bool.
@@ -212,18 +251,14 @@ class Estimator(nn.Module):
                 f"starts must be a bool tensor of shape {tuple(obs.shape[:2])}, "
                 f"got {starts.dtype} of shape {tuple(starts.shape)}"
             )
-        hiddens = []
-        some_start = starts.any(dim=1).tolist()
-        for step_obs, start, some in zip(obs, starts.unsqueeze(-1), some_start, strict=True):
-            if some:
-                state = (state[0].masked_fill(start, 0.0), state[1].masked_fill(start, 0.0))
-            state = self._consume(step_obs, state)
-            hiddens.append(state[0])
-        return self._heads(torch.stack(hiddens), sample, generator), state
+        features, state = self.encoder.unroll(obs, state, starts)
+        return self._heads(features, sample, generator), state
 
-    def decode(self, latent: Tensor) -> Tensor:
-        """Predict the next observation from the latent: (., latent_dim) to (., obs_dim)."""
-        return self.decoder(latent)
+    def decode(self, estimate: Estimate) -> Tensor:
+        """Predict the next observation. Shape: (., obs_dim)."""
+        if self.cfg.decodes_velocity:
+            return self.decoder(torch.cat((estimate.base_lin_vel, estimate.latent), dim=-1))
+        return self.decoder(estimate.latent)
 
     def metres(self, normalised: Tensor) -> Tensor:
         """Return what the height head gives in m."""
@@ -233,22 +268,20 @@ class Estimator(nn.Module):
         """Return heights in m as the height head gives them."""
         return (heights - self.height_offset) / self.height_scale
 
-    def _consume(self, obs: Tensor, state: State) -> State:
-        """Return the state after an observation, float32 even where products are bfloat16."""
-        with hidden_layers(obs.device):
-            return self.lstm(obs, state)
-
     def _heads(
-        self, hidden: Tensor, sample: bool = False, generator: torch.Generator | None = None
+        self, features: Tensor, sample: bool = False, generator: torch.Generator | None = None
     ) -> Estimate:
-        """Turn hidden states, shape (., lstm_hidden), into an estimate."""
-        heights, base_lin_vel = self.heights_head(hidden), self.base_lin_vel_head(hidden)
-        mean, log_var = self.latent_mean_head(hidden), self.latent_log_var_head(hidden)
+        """Turn features, shape (., features), into an estimate."""
+        none = features[..., :0]
+        heights = none if self.heights_head is None else self.heights_head(features)
+        base_lin_vel = self.base_lin_vel_head(features)
+        mean, log_var = self.latent_mean_head(features), self.latent_log_var_head(features)
         log_var = log_var.clamp(*_LOG_VAR_RANGE)
         latent = _sample(mean, log_var, generator) if sample else mean
-        phase = torch.sigmoid(
-            self.phase_network(torch.cat((heights, base_lin_vel, latent), dim=-1))
-        )
+        phase = none
+        if self.phase_network is not None:
+            seen = torch.cat((heights, base_lin_vel, latent), dim=-1)
+            phase = torch.sigmoid(self.phase_network(seen))
         return Estimate(base_lin_vel, self.metres(heights), mean, log_var, latent, phase)
 
 
@@ -256,14 +289,3 @@ def _sample(mean: Tensor, log_var: Tensor, generator: torch.Generator | None) ->
     """Draw a reparameterised sample of a diagonal Gaussian (Kingma and Welling, 2014)."""
     noise = torch.randn(mean.shape, generator=generator, dtype=mean.dtype, device=mean.device)
     return mean + torch.exp(0.5 * log_var) * noise
-
-
-def _mlp(
-    in_features: int, hidden: Sequence[int], out_features: int, activation: type[nn.Module]
-) -> nn.Sequential:
-    """Build a perceptron with the given hidden layers and a linear output."""
-    layers: list[nn.Module] = []
-    for width in hidden:
-        layers += [nn.Linear(in_features, width), activation()]
-        in_features = width
-    return nn.Sequential(*layers, nn.Linear(in_features, out_features))

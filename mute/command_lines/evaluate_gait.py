@@ -129,8 +129,8 @@ def gait(args: GaitArgs) -> None:
     at_speed = _at_speed(args, policy)
     columns = ["beta", "fall_rate", "velocity_error_sq", "yaw_rate_error_sq"]
     columns += ["landing_speed_mean", "apex_mean", "power"]
-    if "phase_mae" in over_range[0]:  # what drives it has an estimator
-        columns += ["velocity_rmse", "height_rmse", "phase_mae"]
+    estimated = ("velocity_rmse", "height_rmse", "phase_mae")
+    columns += [name for name in estimated if name in over_range[0]]
     print_table(f"{args.trials} trials of {args.seconds:g} s over the range", over_range, columns)
     columns = ["beta", "landing_speed_mean", "landing_speed_rms", "apex_mean", "duty_factor"]
     columns += ["stride_frequency", "power"]

@@ -347,8 +347,9 @@ def _walk_in_text(
 
 def _print_header(args: PlayArgs, policy: Driver) -> None:
     command = args.command
+    beta = f"beta {command.beta:g}" if policy.quiet_factor else "beta changes nothing"
     print(
-        f"{policy.task}, iteration {policy.iteration}: beta {command.beta:g}, asked for "
+        f"{policy.task}, iteration {policy.iteration}: {beta}, asked for "
         f"{command.vx:g} m/s forward, {command.vy:g} m/s left, {command.wz:g} rad/s"
         + (f", on {args.floor}" if args.floor else ""),
         flush=True,

@@ -21,6 +21,11 @@ class Driver(Protocol):
     iteration: int
     """Last finished iteration of its training, 0 without one."""
 
+    @property
+    def quiet_factor(self) -> bool:
+        """Whether beta changes how it walks."""
+        ...
+
     def controller(self, cfg: QuadrupedEnvCfg) -> Controller:
         """Return what drives robots, without a past.
 

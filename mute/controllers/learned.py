@@ -15,9 +15,10 @@ from mute.config import TaskCfg, from_plain
 from mute.envs.observations import OBS_DIM
 from mute.envs.quadruped_env import NUM_ACTIONS
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
-from mute.learning.estimated_env import actor_groups, make_estimator
+from mute.learning.estimated_env import actor_groups, make_estimator, policy_group
 from mute.learning.model import PreparedModel
 from mute.learning.saved_state import check_form, check_iteration, check_weights, entry
+from mute.networks.encoders import forgotten
 from mute.networks.estimator import Estimate, Estimator
 
 __all__ = ["LearnedController", "Policy", "load_policy", "make_policy"]
@@ -37,6 +38,11 @@ class Policy:
     """The estimator, in evaluation mode."""
     actor: PreparedModel
     """The actor, its normaliser inside, in evaluation mode."""
+
+    @property
+    def quiet_factor(self) -> bool:
+        """Whether it was trained with beta, and sees it."""
+        return self.cfg.agent.quiet_factor
 
     def controller(self, cfg: QuadrupedEnvCfg) -> LearnedController:
         """Return what drives the robots of an environment with it, without a past."""
@@ -84,7 +90,7 @@ def make_policy(saved: dict[str, Any]) -> Policy:
 
 
 class LearnedController:
-    """Drives robots with a trained policy; keeps the LSTM state of each."""
+    """Drives robots with a trained policy; keeps the estimator's state of each."""
 
     def __init__(self, policy: Policy, num_envs: int) -> None:
         """Start with no past.
@@ -103,15 +109,13 @@ class LearnedController:
         """Forget the past of the masked robots, or of all. Mask shape: (num_envs,)."""
         if mask is None:
             mask = torch.ones(self.num_envs, dtype=torch.bool)
-        hidden, cell = self._state
-        column = mask.unsqueeze(1)
-        self._state = (hidden.masked_fill(column, 0.0), cell.masked_fill(column, 0.0))
+        self._state = forgotten(self._state, mask)
 
     @torch.no_grad()
     def act(self, observations: TensorDict) -> torch.Tensor:
         """Return the mean actions for one control step. Shape: (num_envs, 12)."""
         policy = self.policy
-        obs = observations["policy"]
+        obs = policy_group(observations["policy"], policy.estimator)
         self.estimate, self._state = policy.estimator.step(obs, self._state)
         with_phase = policy.cfg.agent.estimation.actor_uses_phase
         groups = actor_groups(obs, self.estimate, policy.estimator, policy.cfg.env, with_phase)
@@ -121,7 +125,7 @@ class LearnedController:
 def _actor(cfg: TaskCfg, estimator: Estimator) -> PreparedModel:
     """Build the actor's network with the class that learns, from the sizes of its inputs."""
     with torch.no_grad():
-        obs = torch.zeros(1, OBS_DIM)
+        obs = policy_group(torch.zeros(1, OBS_DIM), estimator)
         estimate, _ = estimator.step(obs, estimator.initial_state(1))
     with_phase = cfg.agent.estimation.actor_uses_phase
     groups = actor_groups(obs, estimate, estimator, cfg.env, with_phase)

@@ -23,7 +23,7 @@ from mute.controllers.learned import Policy
 from mute.envs.observations import OBS_DIM, OBSERVATION_WIDTHS
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.scene import JOINT_NAMES, build_scene
-from mute.learning.estimated_env import actor_groups
+from mute.learning.estimated_env import actor_groups, policy_group
 from mute.support.errors import MuteError
 from mute.support.files import replace_file
 
@@ -34,19 +34,19 @@ _OPSET = 18
 _IR_VERSION = 8
 """Version of the file format: the one of the first ONNX that had this opset. torch writes a newer
 one, which ONNX Runtime refuses up to 1.17, while nothing in the graph needs it."""
-_INPUTS = ("obs", "h_in", "c_in")
-_OUTPUTS = ("action", "phase", "base_lin_vel", "h_out", "c_out")
-_RECURRENT_STATE = {"h_in": "h_out", "c_in": "c_out"}
+_SHORT_NAMES = {"hidden": "h", "cell": "c"}
+"""What parts of an estimator's state are called in the file, where not as in the estimator."""
 _COMMAND_NAMES = ("lin_vel_x", "lin_vel_y", "ang_vel_z", "beta")
 
 
 def export_policy(policy: Policy, out: Path) -> None:
     """Write a policy as one self-contained ONNX file, atomically.
 
-    Inputs: `obs` (1, 46), the scaled observation, and the LSTM state `h_in` and `c_in`, each
-    (1, lstm_hidden), zero at the start. Outputs: `action` (1, 12), the mean action in units of
-    `action_scale`; `phase` (1, 4), in [0, 1], feet in the order FR, FL, RR, RL; `base_lin_vel`
-    (1, 3), in m/s in the body frame; and the new state `h_out` and `c_out`.
+    Inputs: `obs` (1, 46), the scaled observation, and what the estimator remembers, zero at the
+    start: the LSTM state `h_in` and `c_in`, each (1, lstm_hidden), or the last observations
+    `history_in`. Outputs: `action` (1, 12), the mean action in units of `action_scale`; `phase`
+    (1, 4), in [0, 1], feet in the order FR, FL, RR, RL, where it is estimated; `base_lin_vel`
+    (1, 3), in m/s in the body frame; and the new state `h_out` and `c_out`, or `history_out`.
 
     The metadata has the keys of mjlab's exports, numbers in full precision, and some more:
 
@@ -65,7 +65,9 @@ def export_policy(policy: Policy, out: Path) -> None:
         MuteError: If the file cannot be written.
     """
     model = _graph(policy)
-    onnx.helper.set_model_props(model, _metadata(policy.cfg.env))
+    state = dict(zip(_state_names(policy, "in"), _state_names(policy, "out"), strict=True))
+    metadata = _metadata(policy.cfg.env) | {"recurrent_state": json.dumps(state)}
+    onnx.helper.set_model_props(model, metadata)
     onnx.checker.check_model(model)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -75,7 +77,7 @@ def export_policy(policy: Policy, out: Path) -> None:
 
 
 class _PolicyGraph(nn.Module):
-    """Estimator and actor as a function of the observation and the LSTM state."""
+    """Estimator and actor as a function of the observation and the estimator's state."""
 
     def __init__(self, policy: Policy) -> None:
         super().__init__()
@@ -85,25 +87,32 @@ class _PolicyGraph(nn.Module):
         self.env_cfg = policy.cfg.env
         self.with_phase = policy.cfg.agent.estimation.actor_uses_phase
 
-    def forward(
-        self, obs: torch.Tensor, hidden: torch.Tensor, cell: torch.Tensor
-    ) -> tuple[torch.Tensor, ...]:
+    def forward(self, obs: torch.Tensor, *state: torch.Tensor) -> tuple[torch.Tensor, ...]:
         """Take one control step; shapes as in `export_policy`."""
-        estimate, (hidden, cell) = self.estimator.step(obs, (hidden, cell))
+        obs = policy_group(obs, self.estimator)
+        estimate, state = self.estimator.step(obs, state)
         groups = actor_groups(obs, estimate, self.estimator, self.env_cfg, self.with_phase)
         action = self.actor(torch.cat([groups[name] for name in self.groups], dim=-1))
-        return action, estimate.phase, estimate.base_lin_vel, hidden, cell
+        phase = [estimate.phase] if self.estimator.num_feet else []
+        return action, *phase, estimate.base_lin_vel, *state
+
+
+def _state_names(policy: Policy, end: str) -> list[str]:
+    """Return what the parts of the estimator's state are called where they go `in` or `out`."""
+    parts = policy.estimator.encoder.state_sizes
+    return [f"{_SHORT_NAMES.get(part, part)}_{end}" for part in parts]
 
 
 def _graph(policy: Policy) -> onnx.ModelProto:
     """Trace the policy with zeros; the graph has no branch that they could hide."""
     arguments = (torch.zeros(1, OBS_DIM), *policy.estimator.initial_state(1, "cpu"))
+    phase = ["phase"] if policy.estimator.num_feet else []
     with torch.no_grad(), _quiet_exporter():
         program = torch.onnx.export(
             _PolicyGraph(policy).eval(),
             arguments,
-            input_names=_INPUTS,
-            output_names=_OUTPUTS,
+            input_names=["obs", *_state_names(policy, "in")],
+            output_names=["action", *phase, "base_lin_vel", *_state_names(policy, "out")],
             opset_version=_OPSET,
             dynamo=True,
             external_data=False,
@@ -160,7 +169,6 @@ def _metadata(cfg: QuadrupedEnvCfg) -> dict[str, str]:
         ),
         "command_names": _comma_separated(_COMMAND_NAMES),
         "control_dt": repr(cfg.step_dt),
-        "recurrent_state": json.dumps(_RECURRENT_STATE),
     }
 
 

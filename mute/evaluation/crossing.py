@@ -48,24 +48,25 @@ class Crossing:
     """Distance ahead over the commanded one, until a fall, mean."""
     velocity_rmse: float
     """Estimator: root of the mean squared error of the velocity over axes, m/s."""
-    height_rmse: float
-    """Estimator: root mean squared error of the height map, m."""
+    height_rmse: float | None
+    """Estimator: root mean squared error of the height map, m; None if it estimates none."""
     height_rmse_flat: float
     """The same of a map that is level at the height of the feet on the ground, m."""
     height_rmse_mean: float
     """The same of the mean map of this kind and level, m."""
-    phase_mae: float
-    """Estimator: mean absolute error of the phase."""
+    phase_mae: float | None
+    """Estimator: mean absolute error of the phase; None if it estimates none."""
     phase_mae_clock: float
     """The same of a clock, see `EstimationErrors`."""
-    contact_time_mae: float
-    """Estimator: mean absolute error of the time until a foot that swings lands, s."""
+    contact_time_mae: float | None
+    """Estimator: mean absolute error of the time until a foot that swings lands, s; None if it
+    estimates no phase."""
     contact_time_mae_clock: float
     """The same of the clock, s."""
 
     def as_dict(self) -> dict[str, float | int | str]:
-        """Return the figures by name."""
-        return asdict(self)
+        """Return the figures by name, without those of what is not estimated."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 class HeightBaselines:

@@ -16,18 +16,18 @@ __all__ = ["EstimationErrors", "EstimationMeter"]
 
 @dataclass
 class EstimationErrors:
-    """Errors of the estimates over all robots and steps."""
+    """Errors of the estimates over all robots and steps; None of what is not estimated."""
 
     velocity_rmse: float
     """Root of the mean squared error over axes, m/s."""
-    height_rmse: float
+    height_rmse: float | None
     """Root mean squared error over the height map, m."""
-    phase_mae: float
+    phase_mae: float | None
     """Mean absolute error where the phase is known in hindsight."""
     phase_mae_clock: float
     """The same of a clock: the time since a foot last landed or lifted over how long it stood or
     swung the last time. It feels every contact, which the estimator does not."""
-    contact_time_mae: float
+    contact_time_mae: float | None
     """Mean absolute error, in a swing, of the time until the foot lands, s: of what the phase
     leaves of a swing of mean length."""
     contact_time_mae_clock: float
@@ -36,8 +36,8 @@ class EstimationErrors:
     """Share of the samples in which it is; standing feet have no phase."""
 
     def as_dict(self) -> dict[str, float]:
-        """Return the errors by name."""
-        return asdict(self)
+        """Return the errors by name, without those of what is not estimated."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 class EstimationMeter:
@@ -75,7 +75,8 @@ class EstimationMeter:
         velocity = privileged[:, columns["base_lin_vel"]]
         heights = self._env.cfg.height_map.metres(privileged[:, columns["heights"]])
         self._velocity.append((estimate.base_lin_vel - velocity).square().mean(dim=1))
-        self._height.append((estimate.heights - heights).square().mean(dim=1))
+        if estimate.heights.shape[1]:
+            self._height.append((estimate.heights - heights).square().mean(dim=1))
         self._contact.append(privileged[:, columns["contact"]] > 0.5)
         self._phase.append(estimate.phase)
         self._starts.append(dones.clone())
@@ -93,6 +94,7 @@ class EstimationMeter:
         known, swings = known & counted[..., None], swings & counted[..., None]
         usual = length[swings & (left == length)].float().mean()
         phase, clock = torch.stack(self._phase), _clock(contact, starts, feet.min_steps)
+        with_phase = phase.shape[2] > 0
 
         def phase_error(told: torch.Tensor) -> float:
             return float((told - truth).abs()[known].mean())
@@ -102,13 +104,18 @@ class EstimationMeter:
 
         return EstimationErrors(
             velocity_rmse=float(torch.stack(self._velocity)[counted].mean().sqrt()),
-            height_rmse=float(torch.stack(self._height)[counted].mean().sqrt()),
-            phase_mae=phase_error(phase),
+            height_rmse=self._height_rmse(counted),
+            phase_mae=phase_error(phase) if with_phase else None,
             phase_mae_clock=phase_error(clock[0]),
-            contact_time_mae=time_error((1.0 - phase) * usual),
+            contact_time_mae=time_error((1.0 - phase) * usual) if with_phase else None,
             contact_time_mae_clock=time_error(clock[1]),
             phase_known=float(known.float().mean()),
         )
+
+    def _height_rmse(self, counted: torch.Tensor) -> float | None:
+        if not self._height:
+            return None
+        return float(torch.stack(self._height)[counted].mean().sqrt())
 
 
 def _clock(

@@ -20,7 +20,7 @@ from mute.learning.model import PreparedModel
 from mute.learning.optimizer import FusedAdam
 from mute.learning.settling import Settling
 from mute.learning.storage import PreparedStorage
-from mute.networks.estimator import State
+from mute.networks.encoders import State
 from mute.support.threads import use_learning_threads
 
 __all__ = ["EstimatorPPO"]
@@ -79,7 +79,7 @@ class EstimatorPPO(PPO):
         self._rollout_state: State = env.state_before
 
     def act(self, obs: TensorDict) -> torch.Tensor:
-        """Sample actions, see `PPO.act`; remember the LSTM state that the rollout began with."""
+        """Sample actions, see `PPO.act`; remember the estimator's state before the rollout."""
         if self.storage.step == 0:
             self._rollout_state = self.env.state_before
             use_learning_threads()  # whatever ran between two rollouts; the environment keeps them
@@ -122,9 +122,12 @@ class EstimatorPPO(PPO):
         use_learning_threads()
         self._settle()
         # Clones made outside inference mode are ordinary tensors, which autograd accepts.
-        hidden, cell = self._rollout_state
-        losses = self.trainer.update(self.storage, (hidden.clone(), cell.clone()), self.ranks)
+        state = tuple(part.clone() for part in self._rollout_state)
+        losses = self.trainer.update(self.storage, state, self.ranks)
         losses |= super().update()
+        if self.env.bootstrap is not None:
+            self.env.bootstrap.draw()
+            losses["estimator_bootstrap"] = self.env.bootstrap.probability
         self.env.refresh()
         self._stop_where_not_finite(losses)
         self.updates += 1

@@ -17,7 +17,8 @@ from mute.config import EstimationCfg
 from mute.envs.phase import hindsight_phase
 from mute.learning.distributed import Ranks
 from mute.learning.optimizer import FusedAdam
-from mute.networks.estimator import Estimate, Estimator, State
+from mute.networks.encoders import State
+from mute.networks.estimator import Estimate, Estimator
 
 __all__ = ["EstimatorTrainer", "Labels", "Losses", "estimator_losses"]
 
@@ -29,11 +30,11 @@ class Labels:
     base_lin_vel: Tensor
     """Trunk velocity in the body frame, m/s. Shape: (T, N, 3)."""
     heights: Tensor
-    """Trunk height above each grid point, m. Shape: (T, N, num_heights)."""
+    """Trunk height above each grid point that is estimated, m. Shape: (T, N, num_heights)."""
     phase: Tensor
-    """Phase of each foot. Shape: (T, N, 4)."""
+    """Phase of each foot whose phase is estimated. Shape: (T, N, num_feet)."""
     phase_closed: Tensor
-    """Where the phase is known, bool. Shape: (T, N, 4)."""
+    """Where the phase is known, bool. Shape: (T, N, num_feet)."""
     next_obs: Tensor
     """Observation one step later. Shape: (T, N, obs_dim)."""
     next_valid: Tensor
@@ -87,7 +88,8 @@ def estimator_losses(
     counts = torch.stack((labels.next_valid.sum(), labels.phase_closed.sum())).float()
     num_valid, num_closed = ranks.mean(counts).clamp(min=1.0 / ranks.world_size)
     velocity_error = (estimate.base_lin_vel - labels.base_lin_vel).square().mean()
-    height_error = (estimate.heights - labels.heights).square().mean()
+    height_errors = (estimate.heights - labels.heights).square()
+    height_error = height_errors.mean() if height_errors.numel() else height_errors.sum()
     estimation = velocity_error + height_error / height_scale**2
     reconstruction = _masked_mean(
         (next_obs_hat - labels.next_obs).square().mean(dim=-1), labels.next_valid, num_valid
@@ -146,7 +148,7 @@ class EstimatorTrainer:
 
         Args:
             storage: The rollout just collected.
-            initial_state: LSTM state before its first observation.
+            initial_state: What the estimator remembered before its first observation.
             ranks: Processes that learn together.
 
         Returns:
@@ -174,15 +176,15 @@ class EstimatorTrainer:
 
     def _record(self, storage: RolloutStorage, initial_state: State) -> dict[str, Tensor]:
         privileged = storage.observations["privileged"]
+        heights = privileged[..., self._privileged["heights"]][..., : self.estimator.num_heights]
+        remembered = zip(self.estimator.encoder.state_sizes, initial_state, strict=True)
         return {
             "obs": storage.observations["policy"].clone(),
             "base_lin_vel": privileged[..., self._privileged["base_lin_vel"]].clone(),
-            "heights": self.estimator.metres(privileged[..., self._privileged["heights"]]),
+            "heights": self.estimator.metres(heights),
             "contact": privileged[..., self._privileged["contact"]] > 0.5,
             "dones": storage.dones[..., 0].bool(),
-            "hidden": initial_state[0].clone(),
-            "cell": initial_state[1].clone(),
-        }
+        } | {name: part.clone() for name, part in remembered}
 
     def _labels(self, past: dict[str, Tensor], current: dict[str, Tensor]) -> Labels:
         """Return the labels of the past rollout, with the contacts before and after it."""
@@ -197,7 +199,7 @@ class EstimatorTrainer:
             torch.cat(contacts), torch.cat(starts), self._min_steps, self._max_steps
         )
         end = phase.shape[0] - current["obs"].shape[0]
-        window = slice(end - past["obs"].shape[0], end)
+        window = slice(end - past["obs"].shape[0], end), slice(None), slice(self.estimator.num_feet)
         return Labels(
             base_lin_vel=past["base_lin_vel"],
             heights=past["heights"],
@@ -216,14 +218,14 @@ class EstimatorTrainer:
         # `chunk` would make fewer where they do not divide evenly: 3 of 5 robots in 4.
         batches = learnt_from.tensor_split(self.cfg.num_mini_batches)
         for env_ids in batches:
-            state = (past["hidden"][env_ids], past["cell"][env_ids])
+            state = tuple(past[name][env_ids] for name in self.estimator.encoder.state_sizes)
             estimate, _ = self.estimator.unroll(
                 past["obs"].index_select(1, env_ids),
                 state,
                 starts.index_select(1, env_ids),
                 sample=True,
             )
-            decoded = self.estimator.decode(estimate.latent)
+            decoded = self.estimator.decode(estimate)
             chosen = labels.select(env_ids)
             losses = estimator_losses(
                 estimate, decoded, chosen, self.cfg, self.estimator.height_scale, ranks
@@ -235,7 +237,13 @@ class EstimatorTrainer:
             self.optimizer.step()
             for name, value in vars(losses).items():
                 sums[name] = sums.get(name, 0.0) + float(value.detach()) / len(batches)
-        closed = float(labels.phase_closed.float().mean())
-        return {f"estimator_{name}": value for name, value in sums.items()} | {
-            "estimator_phase_closed": closed
-        }
+        if self.estimator.num_feet:
+            sums["phase_closed"] = float(labels.phase_closed.float().mean())
+        return {f"estimator_{name}": value for name, value in sums.items() if self._tells(name)}
+
+    def _tells(self, name: str) -> bool:
+        """Return whether a loss or an error is of something that is estimated."""
+        estimator = self.estimator
+        if name in ("phase", "phase_mae"):
+            return estimator.num_feet > 0
+        return name != "height_rmse" or estimator.num_heights > 0

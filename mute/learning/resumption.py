@@ -65,6 +65,7 @@ RULES: dict[str, Rule] = {
     "agent.symmetric": "kept",
     "agent.leading_side": "kept",
     "agent.go_signal": "kept",
+    "agent.quiet_factor": "kept",
     "agent.init_std": "kept",  # what has been learnt took its place
     "agent.std_range": "applied",
     "agent.matmul_precision": "applied",
@@ -78,6 +79,7 @@ RULES: dict[str, Rule] = {
     "agent.estimation.num_mini_batches": "applied",
     "agent.estimation.max_grad_norm": "applied",
     "agent.estimation.actor_uses_phase": "kept",
+    "agent.estimation.adaptive_bootstrap": "kept",
 }
 """What becomes of each field, or of all fields of a part that have no entry of their own."""
 

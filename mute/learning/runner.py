@@ -18,6 +18,7 @@ from mute.config_versions import check_resumable
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.learning.algorithm import EstimatorPPO
+from mute.learning.bootstrapping import AdaptiveBootstrap
 from mute.learning.distributed import Ranks, unnoticed_ranks
 from mute.learning.divergence import DivergedError
 from mute.learning.estimated_env import EstimatedEnv, make_estimator
@@ -103,7 +104,15 @@ class MuteRunner(OnPolicyRunner):
         estimator = make_estimator(cfg).to(device)
         if cfg.agent.symmetric:
             tie_estimator(env, estimator)
-        estimated = EstimatedEnv(env, estimator, device, estimation.actor_uses_phase)
+        estimated = EstimatedEnv(
+            env,
+            estimator,
+            device,
+            estimation.actor_uses_phase,
+            AdaptiveBootstrap(env.num_envs, torch.device(device), self.ranks)
+            if estimation.adaptive_bootstrap
+            else None,
+        )
         # rsl_rl prints its networks.
         with contextlib.redirect_stdout(io.StringIO()), unnoticed_ranks():
             super().__init__(
@@ -115,7 +124,7 @@ class MuteRunner(OnPolicyRunner):
         )
         self.alg.attach(estimated, trainer, self.ranks, Settling.of(cfg.agent))
         if cfg.agent.symmetric:
-            by_group = groups(env, estimator.cfg.latent_dim, estimation.actor_uses_phase)
+            by_group = groups(env, estimator, estimation.actor_uses_phase)
             tie_actor_critic(self.alg.actor, self.alg.critic, by_group, cfg.agent.leading_side)
         self.logger = TrainingLogger(
             log_dir=str(log_dir) if log_dir else None,

@@ -228,17 +228,17 @@ def _check_past(past: object, estimator: Estimator, num_envs: int, place: str) -
     if past == {}:
         return
     steps, before = (_length(past, name, place) for name in ("obs", "contact_before"))
-    robots, lstm = (num_envs,), estimator.lstm
+    robots = (num_envs,)
     shapes: dict[str, tuple[tuple[int, ...], torch.dtype]] = {
-        "obs": ((steps, *robots, lstm.input_size), torch.float32),
+        "obs": ((steps, *robots, estimator.obs_dim), torch.float32),
         "base_lin_vel": ((steps, *robots, 3), torch.float32),
-        "heights": ((steps, *robots, estimator.heights_head.out_features), torch.float32),
+        "heights": ((steps, *robots, estimator.num_heights), torch.float32),
         "contact": ((steps, *robots, len(LEGS)), torch.bool),
         "dones": ((steps, *robots), torch.bool),
         "starts": ((steps, *robots), torch.bool),
-        "hidden": ((*robots, lstm.hidden_size), torch.float32),
-        "cell": ((*robots, lstm.hidden_size), torch.float32),
     }
+    for name, size in estimator.encoder.state_sizes.items():
+        shapes[name] = ((*robots, size), torch.float32)
     if before:
         shapes["contact_before"] = ((before, *robots, len(LEGS)), torch.bool)
         shapes["starts_before"] = ((before, *robots), torch.bool)

@@ -24,6 +24,7 @@ __all__ = [
     "POLAR",
     "groups",
     "heights",
+    "observation",
     "tie_actor_critic",
     "tie_estimator",
 ]
@@ -76,18 +77,25 @@ def heights(grid: torch.Tensor) -> Reflection:
     return Reflection(tuple(distances.argmin(dim=1).tolist()), (1.0,) * len(grid))
 
 
-def groups(env: QuadrupedEnv, latent_dim: int, with_phase: bool) -> dict[str, Reflection]:
+def observation(obs_dim: int) -> Reflection:
+    """Return the reflection of what the networks see of an observation, its first columns."""
+    return Reflection(OBSERVATION.index[:obs_dim], OBSERVATION.sign[:obs_dim])
+
+
+def groups(env: QuadrupedEnv, estimator: Estimator, with_phase: bool) -> dict[str, Reflection]:
     """Return the reflection of each observation group that actor and critic see.
 
     Args:
         env: The environment, whose groups these are.
-        latent_dim: Width of the estimator's latent.
-        with_phase: Whether the group `estimate` holds the phase.
+        estimator: What makes the group `estimate`.
+        with_phase: Whether that holds the phase, if it is estimated.
     """
     parts = _PARTS | {"heights": heights(env.grid)}
-    estimate = [POLAR, parts["heights"], Reflection.swapped(latent_dim)]
+    estimated_heights = [parts["heights"]] if estimator.num_heights else []
+    estimate = [POLAR, *estimated_heights, Reflection.swapped(estimator.cfg.latent_dim)]
+    with_phase = with_phase and estimator.num_feet > 0
     return {
-        "policy": OBSERVATION,
+        "policy": observation(estimator.obs_dim),
         "privileged": Reflection.joined([parts[name] for name in env.privileged_slices]),
         "go": Reflection.unchanged(1),
         "estimate": Reflection.joined([*estimate, FEET] if with_phase else estimate),
@@ -100,7 +108,7 @@ def tie_estimator(env: QuadrupedEnv, estimator: Estimator) -> None:
     Raises:
         ValueError: If the width of a layer is odd.
     """
-    estimator.tie(OBSERVATION, POLAR, heights(env.grid), FEET)
+    estimator.tie(observation(estimator.obs_dim), POLAR, heights(env.grid), FEET)
 
 
 def tie_actor_critic(

@@ -26,7 +26,7 @@ class HeightDots:
 
         Args:
             env: Where it walks.
-            controller: What drives it; one without an estimate has no orange dots.
+            controller: What drives it; one that estimates no heights has no orange dots.
             robot: Its index.
         """
         self._env, self._controller, self._robot = env, controller, robot
@@ -53,7 +53,7 @@ class HeightDots:
         true = env.ground.height_map(env.grid, env.base_pos, env.heading)[robot]
         dots = [(self._places(true), _TRUE)]
         estimate = getattr(self._controller, "estimate", None)
-        if estimate is not None:
+        if estimate is not None and estimate.heights.shape[1]:
             dots.append((self._places(estimate.heights[robot]), _ESTIMATED))
         return dots
 

@@ -19,6 +19,12 @@ def _make_estimator(seed=0):
     return Estimator(OBS_DIM, NUM_HEIGHTS, cfg, height_offset=0.25, height_scale=0.5)
 
 
+def _made(module: torch.nn.Module | None) -> torch.nn.Module:
+    """Return a head that an estimator need not have."""
+    assert module is not None
+    return module
+
+
 def _make_sequence(seed=1):
     generator = torch.Generator().manual_seed(seed)
     obs = torch.randn((NUM_STEPS, NUM_ENVS, OBS_DIM), generator=generator)
@@ -51,9 +57,9 @@ def test_an_estimate_is_what_each_head_says_of_the_hidden_state():
         estimator.latent_log_var_head.bias.copy_(torch.tensor([-30.0, 0.0, 0.1, 30.0]))
     obs, state, _ = _make_sequence()
     estimate, (hidden, _) = estimator.step(obs[0], state)
-    heights, velocity = estimator.heights_head(hidden), estimator.base_lin_vel_head(hidden)
+    heights, velocity = _made(estimator.heights_head)(hidden), estimator.base_lin_vel_head(hidden)
     mean = estimator.latent_mean_head(hidden)
-    phase = estimator.phase_network(torch.cat((heights, velocity, mean), dim=-1)).sigmoid()
+    phase = _made(estimator.phase_network)(torch.cat((heights, velocity, mean), dim=-1)).sigmoid()
     close = torch.testing.assert_close
     close(estimate.base_lin_vel, velocity)
     close(estimate.heights, 0.25 + 0.5 * heights)
@@ -123,7 +129,11 @@ def test_every_part_of_the_estimate_has_its_shape():
 
 def test_the_decoder_turns_latents_into_observations():
     estimator = _make_estimator()
-    assert estimator.decode(torch.zeros(2, 3, 4)).shape == (2, 3, OBS_DIM)
+    estimate, _ = estimator.unroll(*_make_sequence())
+    decoded = estimator.decode(estimate)
+    assert decoded.shape == (NUM_STEPS, NUM_ENVS, OBS_DIM)
+    elsewhere = estimate._replace(base_lin_vel=estimate.base_lin_vel + 1.0)
+    assert torch.equal(estimator.decode(elsewhere), decoded)
 
 
 def test_the_initial_state_is_zero():
@@ -136,7 +146,7 @@ def test_phase_and_log_variance_stay_in_range_for_enormous_weights():
     estimator = _make_estimator()
     with torch.no_grad():
         estimator.latent_log_var_head.weight.mul_(1e4)
-        for parameter in estimator.phase_network.parameters():
+        for parameter in _made(estimator.phase_network).parameters():
             parameter.mul_(1e4)
     estimate, _ = estimator.unroll(*_make_sequence())
     assert estimate.latent_log_var.min() == -10.0
@@ -148,8 +158,10 @@ def test_phase_and_log_variance_stay_in_range_for_enormous_weights():
 def test_a_silent_height_head_says_the_offset_and_one_unit_is_the_scale():
     estimator = _make_estimator()
     with torch.no_grad():
-        estimator.heights_head.weight.zero_()
-        estimator.heights_head.bias.copy_(torch.tensor([0.0, 1.0, -1.0, 0.0, 0.0, 0.0]))
+        head = estimator.heights_head
+        assert head is not None
+        head.weight.zero_()
+        head.bias.copy_(torch.tensor([0.0, 1.0, -1.0, 0.0, 0.0, 0.0]))
     obs, state, _ = _make_sequence()
     heights = estimator.step(obs[0], state)[0].heights[0]
     assert heights.tolist() == pytest.approx([0.25, 0.75, -0.25, 0.25, 0.25, 0.25])
@@ -160,7 +172,7 @@ def test_the_phase_network_reads_normalised_heights_then_velocity_then_latent():
     obs, state, _ = _make_sequence()
     estimate, _ = estimator.step(obs[0], state)
     inputs = ((estimate.heights - 0.25) / 0.5, estimate.base_lin_vel, estimate.latent)
-    expected = estimator.phase_network(torch.cat(inputs, dim=-1)).sigmoid()
+    expected = _made(estimator.phase_network)(torch.cat(inputs, dim=-1)).sigmoid()
     torch.testing.assert_close(estimate.phase, expected, atol=1e-5, rtol=0)
 
 
@@ -197,7 +209,7 @@ def test_a_loss_on_the_phase_reaches_the_encoder_and_the_heads_that_feed_it():
     for module in (
         estimator.lstm,
         estimator.base_lin_vel_head,
-        estimator.heights_head,
+        _made(estimator.heights_head),
         estimator.latent_mean_head,
     ):
         assert all(p.grad is not None and p.grad.abs().sum() > 0 for p in module.parameters())
@@ -207,11 +219,11 @@ def test_a_loss_on_the_phase_reaches_the_encoder_and_the_heads_that_feed_it():
 def test_a_reconstruction_of_a_sample_reaches_mean_and_variance_but_not_the_phase_network():
     estimator = _make_estimator()
     estimate, _ = estimator.unroll(*_make_sequence(), sample=True)
-    estimator.decode(estimate.latent).square().sum().backward()
+    estimator.decode(estimate).square().sum().backward()
     for head in (estimator.latent_mean_head, estimator.latent_log_var_head):
         assert head.weight.grad is not None
         assert head.weight.grad.abs().sum() > 0
-    assert all(p.grad is None for p in estimator.phase_network.parameters())
+    assert all(p.grad is None for p in _made(estimator.phase_network).parameters())
     assert all(p.grad is None for p in estimator.base_lin_vel_head.parameters())
 
 

@@ -35,6 +35,11 @@ class MpcDriver:
     iteration: int = 0
     """It has not been trained."""
 
+    @property
+    def quiet_factor(self) -> bool:
+        """It knows none."""
+        return False
+
     def controller(self, cfg: QuadrupedEnvCfg) -> MpcController:
         """Return a controller of the robots of an environment, without a past."""
         return MpcController(cfg, self.settings)

@@ -33,6 +33,7 @@ from mute.envs.scene import JOINT_NAMES
 from mute.learning.runner import MuteRunner, policy_part
 from mute.networks.estimator import EstimatorCfg
 from mute.support.errors import MuteError
+from mute.tasks import make_task
 
 EXAMPLE = REPOSITORY / "examples" / "run_onnx.py"
 HIDDEN = 24
@@ -91,18 +92,19 @@ class _OnnxSide:
 
     def __init__(self, path: Path):
         self.session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
+        self.shapes = {each.name: each.shape for each in self.session.get_inputs()}
+        self.recurrent = json.loads(_metadata(path)["recurrent_state"])
         self.reset()
 
     def reset(self) -> None:
-        self.hidden = np.zeros((1, HIDDEN), np.float32)
-        self.cell = np.zeros((1, HIDDEN), np.float32)
+        self.state = {name: np.zeros(self.shapes[name], np.float32) for name in self.recurrent}
 
-    def step(self, obs: torch.Tensor) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        inputs = {"obs": obs.numpy(), "h_in": self.hidden, "c_in": self.cell}
-        names = ["action", "phase", "base_lin_vel", "h_out", "c_out"]
-        outputs = [np.asarray(output) for output in self.session.run(names, inputs)]
-        action, phase, velocity, self.hidden, self.cell = outputs
-        return action, phase, velocity
+    def step(self, obs: torch.Tensor) -> dict[str, np.ndarray]:
+        names = [each.name for each in self.session.get_outputs()]
+        values = self.session.run(names, {"obs": obs.numpy()} | self.state)
+        outputs = dict(zip(names, map(np.asarray, values), strict=True))
+        self.state = {name: outputs.pop(after) for name, after in self.recurrent.items()}
+        return outputs
 
 
 def _metadata(path: Path) -> dict[str, str]:
@@ -128,11 +130,15 @@ def _assert_same_outputs(policy: Policy, path: Path, steps: int) -> int:
     observations, episodes = env.get_observations(), 1
     for _ in range(steps):
         expected = torch_side.act(observations)
-        action, phase, velocity = onnx_side.step(observations["policy"])
-        assert torch_side.estimate is not None
-        np.testing.assert_allclose(action, expected, rtol=0.0, atol=1e-4)
-        np.testing.assert_allclose(phase, torch_side.estimate.phase, rtol=0.0, atol=1e-4)
-        np.testing.assert_allclose(velocity, torch_side.estimate.base_lin_vel, rtol=0.0, atol=1e-4)
+        outputs = onnx_side.step(observations["policy"])
+        estimate = torch_side.estimate
+        assert estimate is not None
+        wanted = {"action": expected, "base_lin_vel": estimate.base_lin_vel}
+        if policy.estimator.num_feet:
+            wanted["phase"] = estimate.phase
+        assert outputs.keys() == wanted.keys()
+        for name, value in wanted.items():
+            np.testing.assert_allclose(outputs[name], value, rtol=0.0, atol=1e-4, err_msg=name)
         observations, _, dones, _ = env.step(expected)
         if bool(dones.any()):
             torch_side.reset(dones)
@@ -150,6 +156,20 @@ def test_a_policy_whose_actor_ignores_the_phase_is_reproduced_too(tmp_path: Path
     policy = load_policy(_write_checkpoint(tmp_path / "random.pt", cfg))
     export_policy(policy, tmp_path / "policy.onnx")
     _assert_same_outputs(policy, tmp_path / "policy.onnx", steps=20)
+
+
+def test_a_policy_with_a_history_and_no_quiet_factor_is_reproduced_too(tmp_path: Path):
+    cfg = _make_cfg()
+    task = make_task("go1_dreamwaq").agent
+    agent = dataclasses.replace(cfg.agent, quiet_factor=False, estimation=task.estimation)
+    rewards = dataclasses.replace(cfg.env.rewards, phase_source="true")
+    cfg = TaskCfg(env=dataclasses.replace(cfg.env, rewards=rewards), agent=agent)
+    policy = load_policy(_write_checkpoint(tmp_path / "random.pt", cfg))
+    export_policy(policy, tmp_path / "policy.onnx")
+    assert json.loads(_metadata(tmp_path / "policy.onnx")["recurrent_state"]) == {
+        "history_in": "history_out"
+    }
+    assert _assert_same_outputs(policy, tmp_path / "policy.onnx", steps=250) >= 2
 
 
 @pytest.mark.parametrize("standing", [0.0, 1.0])
@@ -170,7 +190,7 @@ def test_two_robots_driven_by_torch_and_by_onnx_stay_together(policy: Policy, ex
     start = one.simulation.qpos.clone()
     for _ in range(100):
         _, _, ended, _ = one.step(torch_side.act(one.get_observations()))
-        action, _, _ = onnx_side.step(other.get_observations()["policy"])
+        action = onnx_side.step(other.get_observations()["policy"])["action"]
         other.step(torch.from_numpy(action))
         assert not bool(ended.any())
     torch.testing.assert_close(other.simulation.qpos, one.simulation.qpos, rtol=0.0, atol=1e-3)

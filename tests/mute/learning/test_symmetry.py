@@ -11,14 +11,14 @@ from learning_helpers import differences, everything, make_cfg
 from tensordict import TensorDict
 
 from mute.checkpoint import CheckpointError
-from mute.config import AgentCfg
+from mute.config import AgentCfg, TaskCfg
 from mute.envs.height_map import HeightMapCfg
 from mute.envs.observations import OBS_DIM, ObservationsCfg
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg, full_randomization
 from mute.envs.terrain import TerrainCfg
-from mute.learning.estimated_env import estimate_group, go_group
+from mute.learning.estimated_env import estimate_group, go_group, make_estimator
 from mute.learning.runner import MuteRunner
 from mute.learning.symmetry import FEET, JOINTS, OBSERVATION, POLAR, groups, heights
 from mute.networks.estimator import EstimatorCfg
@@ -39,6 +39,11 @@ def runner() -> MuteRunner:
     return runner
 
 
+def _groups(env: QuadrupedEnv) -> dict[str, Reflection]:
+    cfg = TaskCfg(env=QuadrupedEnvCfg(height_map=env.cfg.height_map))
+    return groups(env, make_estimator(cfg), with_phase=True)
+
+
 def test_a_mirrored_robot_sees_the_mirror_image():
     calm = {"randomization": RandomizationCfg(enabled=False), "initial_velocity": 0.0}
     noiseless = ObservationsCfg(noise_level=0.0)
@@ -50,7 +55,7 @@ def test_a_mirrored_robot_sees_the_mirror_image():
     qvel[1, :6] = torch.tensor([0.3, -0.2, 0.0, -0.5, 0.3, 0.4])
     env.commands.command[:] = torch.tensor([[0.5, 0.2, -0.7, 0.3], [0.5, -0.2, 0.7, 0.3]])
     torch.manual_seed(0)
-    reflections = groups(env, latent_dim=2, with_phase=True)
+    reflections = _groups(env)
     action = torch.randn(1, 12)
     columns = env.privileged_slices
     steps = [env.step(torch.cat((action, JOINTS(action)))) for _ in range(8)]
@@ -92,9 +97,9 @@ def test_a_height_is_mirrored_to_the_point_on_the_other_side(cfg):
 def test_the_critics_physics_are_mirrored_by_the_side_of_the_centre_of_mass():
     wide = full_randomization()
     env = QuadrupedEnv(QuadrupedEnvCfg(num_envs=3, randomization=wide))
-    physics = groups(env, latent_dim=2, with_phase=True)["privileged"](
-        env.get_observations()["privileged"]
-    )[:, env.privileged_slices["physics"]]
+    physics = _groups(env)["privileged"](env.get_observations()["privileged"])[
+        :, env.privileged_slices["physics"]
+    ]
     # Friction, added mass, where the centre of mass lies along x, y, z, strength and delay.
     signs = torch.tensor([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
     torch.testing.assert_close(physics, env.physics * signs)
@@ -129,11 +134,11 @@ def test_all_networks_commute_with_the_mirror_after_learning(runner):
     obs = torch.randn(20, 46)
     state = (torch.randn(20, 16), torch.randn(20, 16))
     privileged = torch.randn(20, runner.env.get_observations()["privileged"].shape[1])
-    reflections = groups(runner.env.env, estimator.cfg.latent_dim, with_phase=True)
+    reflections = groups(runner.env.env, estimator, with_phase=True)
     with torch.no_grad():
         estimate, state_after = estimator.step(obs, state)
         image, image_after = estimator.step(OBSERVATION(obs), (hidden(state[0]), hidden(state[1])))
-        decoded = estimator.decode(estimate.latent), estimator.decode(image.latent)
+        decoded = estimator.decode(estimate), estimator.decode(image)
         views = []
         for seen, mirror in ((estimate, False), (image, True)):
             parts = {"policy": obs, "privileged": privileged}
@@ -233,7 +238,7 @@ def test_a_leading_side_alone_keeps_a_mirrored_robot_from_a_mirrored_answer(lead
     agent = dataclasses.replace(cfg.agent, symmetric=True, leading_side=leading)
     torch.manual_seed(0)
     runner = MuteRunner("go1_mute", dataclasses.replace(cfg, agent=agent), None)
-    reflections = groups(runner.env.env, cfg.agent.estimation.network.latent_dim, with_phase=True)
+    reflections = groups(runner.env.env, runner.env.estimator, with_phase=True)
     seen = runner.env.get_observations()
     names = runner.alg.actor.obs_groups
     image = {name: reflections[name](seen[name]) for name in names}
