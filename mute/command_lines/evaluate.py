@@ -15,6 +15,7 @@ from mute.command_lines.evaluate_noise import (
     sweep_beta,
     sweep_speed,
 )
+from mute.command_lines.evaluate_paper import PaperArgs, paper
 from mute.command_lines.evaluate_reliability import ReliabilityArgs, reliability
 from mute.command_lines.evaluate_terrain import TerrainArgs, terrain
 from mute.command_lines.evaluate_walk import WalkArgs, walk
@@ -30,6 +31,7 @@ _COMMANDS: dict[str, tuple[type, Callable[[Any], int | None], str]] = {
     "sweep-beta": (SweepBetaArgs, sweep_beta, "modelled noise levels against the quiet factor"),
     "walk": (WalkArgs, walk, "a long walk over mixed floors, with a map of the levels"),
     "terrain": (TerrainArgs, terrain, "every kind of ground and level, and what is known of it"),
+    "paper": (PaperArgs, paper, "the paper's comparison with DreamWaQ and the MPC, and a report"),
     "reliability": (ReliabilityArgs, reliability, "starts, follows, stands, heeds beta, or not"),
 }
 

@@ -1,0 +1,190 @@
+"""The comparison of methods as a report in Markdown; it holds no figure of its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from mute.acoustics.soundscape import SOURCES
+from mute.command_lines.card_tables import markdown
+from mute.evaluation.comparison.conclusions import (
+    EQUAL_SPEED,
+    equal_speed_level,
+    labels,
+    level,
+    papers_level,
+    verdicts,
+)
+from mute.evaluation.comparison.measurements import FLOORS_COMPARED
+from mute.evaluation.paper_levels import PAPER_WALK
+
+__all__ = ["comparison_report"]
+
+Row = Mapping[str, Any]
+
+
+def comparison_report(found: Mapping[str, Any]) -> str:
+    """Return the report of what `evaluate.py paper` measured; the same input, the same text.
+
+    Args:
+        found: What the command wrote to `comparison.json`.
+    """
+    rows, sweep, walk = found["levels"], found["sweep"], found["walk"]
+    parts = [_head(found), _walkers_table(found["walkers"])]
+    told = verdicts(rows, sweep, walk)
+    if told:
+        parts += ["## What the paper found, here", _verdicts_table(told)]
+    if rows:
+        parts += ["## Levels at 0.5 m/s", _levels_text(found), _levels_table(rows)]
+        parts += ["## Where the noise comes from", _sources_table(rows)]
+    if sweep:
+        parts += ["## The quiet factor", _sweep_table(sweep)]
+    if walk is not None:
+        parts += ["## The long walk", _walk_text(walk)]
+    figures = [f"![{name}]({name}.png)" for name in found["figures"]]
+    return "\n\n".join([*parts, *figures]) + "\n"
+
+
+def _head(found: Mapping[str, Any]) -> str:
+    quick = (
+        " **Measured with `--quick`: it shows that all works, its figures mean nothing.**"
+        if found["quick"]
+        else ""
+    )
+    return (
+        f"<!-- Made by `{found['command']}`; do not edit. -->\n\n"
+        "# The comparison, in simulation\n\n"
+        "Every level is modelled and dBA at the trunk; nothing was measured on a real robot."
+        f"{quick} {found['trials']} robots a setting, {found['seconds']:g} s each, seed "
+        f"{found['seed']}; they differ and see with noise. Commit {found['commit']}, calibration "
+        f"{found['calibration_sha256'][:12]}, on {found['machine']}."
+    )
+
+
+def _walkers_table(walkers: Sequence[Row]) -> str:
+    columns = {
+        "method": ("method", "{}"),
+        "policy": ("policy", "{}"),
+        "iteration": ("last iteration", "{}"),
+        "training_seed": ("seed", "{}"),
+        "digest": ("SHA-256", "{}"),
+    }
+    return markdown([dict(row) | {"digest": row["sha256"][:12]} for row in walkers], columns)
+
+
+def _verdicts_table(told: Sequence[Any]) -> str:
+    columns = {"claim": ("claim", "{}"), "figure": ("here", "{}"), "holds": ("holds", "{}")}
+    rows = [
+        {"claim": one.claim, "figure": one.figure, "holds": "yes" if one.holds else "**no**"}
+        for one in told
+    ]
+    return markdown(rows, columns)
+
+
+def _levels_text(found: Mapping[str, Any]) -> str:
+    several = max(len(row.trainings) for row in _table_levels(found["levels"])) > 1
+    over = (
+        " Of several trainings it is the mean, and their smallest and largest are in brackets."
+        if several
+        else ""
+    )
+    return (
+        "MNL and PNL, asked for 0.5 m/s, with the standard deviation over robots; the paper's; and "
+        f"the difference.{over} The last column is the MNL at an *actual* {EQUAL_SPEED:g} m/s, "
+        "between what came out of other commands."
+    )
+
+
+def _table_levels(rows: Sequence[Row]) -> list[Any]:
+    every = (
+        level(rows, name, surface, EQUAL_SPEED, "mnl")
+        for name in labels(rows)
+        for surface in FLOORS_COMPARED
+    )
+    return [one for one in every if one is not None]
+
+
+def _levels_table(rows: Sequence[Row]) -> str:
+    columns = {
+        "label": ("method", "{}"),
+        "surface": ("floor", "{}"),
+        "mnl": ("MNL", "{}"),
+        "mnl_paper": ("paper", "{:.1f}"),
+        "mnl_off": ("differs", "{:+.1f}"),
+        "pnl": ("PNL", "{}"),
+        "pnl_paper": ("paper", "{:.1f}"),
+        "pnl_off": ("differs", "{:+.1f}"),
+        "equal": ("MNL at equal speed", "{:.1f}"),
+    }
+    table = []
+    for name in labels(rows):
+        for surface in FLOORS_COMPARED:
+            equal = equal_speed_level(rows, name, surface)
+            line: dict[str, Any] = {"label": name, "surface": surface}
+            line["equal"] = None if math.isnan(equal) else equal
+            for figure in ("mnl", "pnl"):
+                line |= _level_cells(rows, name, surface, figure)
+            table.append(line)
+    return markdown(table, columns)
+
+
+def _level_cells(rows: Sequence[Row], name: str, surface: str, figure: str) -> dict[str, Any]:
+    found = level(rows, name, surface, EQUAL_SPEED, figure)
+    paper = papers_level(name, surface, figure)
+    cells: dict[str, Any] = {figure: None, f"{figure}_paper": paper, f"{figure}_off": None}
+    if found is None:
+        return cells
+    text = f"{found.mean:.1f}"
+    if not math.isnan(found.std):
+        text += f" ± {found.std:.1f}"
+    if len(found.trainings) > 1:
+        text += f" ({min(found.trainings):.1f}, {max(found.trainings):.1f})"
+    cells[figure] = text
+    if paper is not None:
+        cells[f"{figure}_off"] = found.mean - paper
+    return cells
+
+
+def _sources_table(rows: Sequence[Row]) -> str:
+    columns = {"label": ("method", "{}"), "surface": ("floor", "{}")} | {
+        f"laeq_{source}": (source, "{:.1f}") for source in SOURCES
+    }
+    at_half = [row for row in rows if row["command_speed"] == EQUAL_SPEED]
+    first = {(row["label"], row["surface"]): row for row in reversed(at_half)}
+    table = [
+        first[name, surface]
+        for name in labels(rows)
+        for surface in FLOORS_COMPARED
+        if (name, surface) in first
+    ]
+    return "LAeq of each source alone, asked for 0.5 m/s; of the first training.\n\n" + markdown(
+        table, columns
+    )
+
+
+def _sweep_table(sweep: Sequence[Row]) -> str:
+    columns = {
+        "beta": ("beta", "{:g}"),
+        "mnl_mean": ("MNL", "{:.1f}"),
+        "pnl_mean": ("PNL", "{:.1f}"),
+        "speed_mean": ("actual speed (m/s)", "{:.2f}"),
+        "velocity_error_sq": ("squared velocity error (m/s)²", "{:.4f}"),
+        "training_seed": ("seed", "{}"),
+    }
+    asked = sweep[0]["command_speed"]
+    return f"On wood, asked for {asked:g} m/s.\n\n" + markdown(sweep, columns)
+
+
+def _walk_text(walk: Row) -> str:
+    mnl, pnl = (
+        "none heard" if walk[f"{name}_mean"] is None else f"{walk[f'{name}_mean']:.1f} dBA"
+        for name in ("mnl", "pnl")
+    )
+    return (
+        f"{walk['path_length']:.1f} m over mixed floors, asked for {walk['course_speed']:g} m/s at "
+        f"beta {walk['beta']:g}: {walk['arrived']} of {walk['trials']} robots arrived, the first "
+        f"in {walk['seconds']:.0f} s (the paper's {PAPER_WALK['seconds']:.0f} s); MNL {mnl}, PNL "
+        f"{pnl}; the paper's {PAPER_WALK['mnl']:.1f} and {PAPER_WALK['pnl']:.1f} dBA, at a beta "
+        "that it does not name."
+    )

@@ -1,0 +1,248 @@
+"""`evaluate.py paper`: every experiment of the paper in one go, resumed where it was stopped."""
+
+from __future__ import annotations
+
+import itertools
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from mute.acoustics.origin import policy_origin, sound_origin
+from mute.command_lines.arguments import (
+    Words,
+    check_betas,
+    check_distinct,
+    check_option,
+    check_seed,
+    check_words,
+    make_directory,
+)
+from mute.command_lines.card_comparison import comparison_report
+from mute.command_lines.evaluate_walk import WalkArgs, walk
+from mute.command_lines.policy_options import DriverArgs
+from mute.command_lines.sound_options import load_audible_policy, progress_bar, tell
+from mute.evaluation.comparison.measurements import FULL, QUICK, Extent, Job, Kept, jobs, measure
+from mute.evaluation.comparison.walkers import DREAMWAQ, MPC, MUTE, Walker
+from mute.evaluation.plotting import check_matplotlib
+from mute.evaluation.tables import print_table, read_json, write_csv, write_json
+from mute.support.errors import MuteError
+from mute.support.files import write_file
+from mute.support.plain_data import without_nan
+from mute.support.ranges import Range
+from mute.support.resources import RESOURCES
+from mute.tasks import DEFAULT_TASK
+
+__all__ = ["PARTS", "PaperArgs", "paper"]
+
+PARTS = ("levels", "sweep", "walk")
+"""What the comparison is made of."""
+
+_POLICIES = RESOURCES / "go1"
+_COURSES = RESOURCES / "courses"
+
+
+def _that_ship(task: str) -> tuple[Path, ...]:
+    path = _POLICIES / f"{task}.pt"
+    return (path,) if path.is_file() else ()
+
+
+@dataclass
+class PaperArgs:
+    """Every experiment of the paper, in simulation, with a report.
+
+    Levels of all methods on wood, carpet and tile at several speeds, the quiet factor, and the long
+    walk. What has been measured is kept, and read back where the command is run again.
+    """
+
+    mute: tuple[Path, ...] = _that_ship(DEFAULT_TASK)
+    """MUTE's policies; several are trainings of one recipe."""
+    dreamwaq: tuple[Path, ...] = _that_ship("go1_dreamwaq")
+    """DreamWaQ's; by default the one that ships, if one does."""
+    others: tuple[Path, ...] = ()
+    """Policies of further tasks to compare, under the tasks' names."""
+    mpc: bool = True
+    """Whether the model-predictive controller is compared."""
+    parts: Words = PARTS
+    """What to measure: levels, sweep (of the quiet factor), walk."""
+    beta: float = 0.5
+    """Quiet factor of the long walk."""
+    trials: int | None = None
+    """Robots for each setting; the paper's 20 unless given, 2 with --quick."""
+    quick: bool = False
+    """As little of everything as shows that it works."""
+    seed: int = 1
+    """Seed of the robots, of initial states and of the noise."""
+    out: Path = Path("evaluation/paper")
+    """Directory of the report, the figures and the data."""
+
+    @property
+    def extent(self) -> Extent:
+        """How much is measured."""
+        return (QUICK if self.quick else FULL).with_trials(self.trials)
+
+
+def paper(args: PaperArgs) -> None:
+    """Measure what is not there yet, and write the report.
+
+    Raises:
+        MuteError: If an argument is bad, or a policy cannot be used.
+    """
+    _check(args)
+    check_matplotlib()
+    origin = sound_origin()
+    walkers = _walkers(args)
+    make_directory(args.out / "measured")
+    torch.set_num_threads(1)  # the physics engine has the cores
+    kept = Kept(args.out / "measured", origin)
+    rows = _measured(args, jobs(walkers, args.extent, args.parts), kept)
+    walked = _walked(args) if "walk" in args.parts else None
+    found: dict[str, Any] = {
+        "command": _command(args),
+        "quick": args.quick,
+        "trials": args.extent.trials,
+        "seconds": args.extent.seconds,
+        "seed": args.seed,
+        **origin,
+        "walkers": [_about(walker) for walker in walkers],
+        "levels": [row for row in rows if row["part"] == "levels"],
+        "sweep": [row for row in rows if row["part"] == "sweep"],
+        "walk": walked,
+    }
+    _report(args, without_nan(found))
+
+
+def _check(args: PaperArgs) -> None:
+    check_words("parts", args.parts, PARTS)
+    check_betas([args.beta])
+    check_seed(args.seed)
+    if args.trials is not None:
+        check_option("trials", args.trials, Range(1, 64, whole=True))
+    for name in ("mute", "dreamwaq", "others"):
+        paths = getattr(args, name)
+        if paths:
+            check_distinct(name, paths)
+    if not args.mute:
+        raise MuteError("--mute must name at least one policy, got none")
+
+
+def _walkers(args: PaperArgs) -> list[Walker]:
+    """Return what is compared, from loud to quiet as the paper has it.
+
+    Raises:
+        MuteError: If a policy cannot be used.
+    """
+    walkers = []
+    if args.mpc:
+        mpc = DriverArgs(controller="mpc")
+        origin = mpc.driver_origin()
+        walkers.append(Walker(MPC, mpc.driver(), origin["policy"], origin["policy_sha256"]))
+    named = [(DREAMWAQ, path) for path in args.dreamwaq] + [(MUTE, path) for path in args.mute]
+    for method, path in [*named, *(("", path) for path in args.others)]:
+        policy, origin = load_audible_policy(path), policy_origin(path)
+        walkers.append(
+            Walker(method or policy.task, policy, origin["policy"], origin["policy_sha256"])
+        )
+    return walkers
+
+
+def _measured(args: PaperArgs, wanted: Sequence[Job], kept: Kept) -> list[dict[str, Any]]:
+    """Return the rows of all jobs, those read back that were measured before."""
+    extent = args.extent
+    asked = [kept.asked(job, extent, args.seed) for job in wanted]
+    known = [kept.read(each) for each in asked]
+    left = sum(job.steps(extent) for job, rows in zip(wanted, known, strict=True) if rows is None)
+    done = itertools.count(1)
+    rows: list[dict[str, Any]] = []
+    with progress_bar("levels", max(left, 1)) as advance:
+        for job, each, before in zip(wanted, asked, known, strict=True):
+            if before is None:
+                measured = measure(job, extent, args.seed, lambda: advance(next(done)))
+                kept.write(each, measured)
+                rows += without_nan(measured)
+            else:
+                rows += before
+    return rows
+
+
+def _walked(args: PaperArgs) -> Mapping[str, Any]:
+    """Return what came of the long walk of the first of MUTE's policies, made before or now."""
+    folder, policy = args.out / "walk", args.mute[0]
+    course = _COURSES / ("short.yaml" if args.quick else "office.yaml")
+    options = WalkArgs(
+        policy=policy,
+        course=course,
+        beta=args.beta,
+        trials=args.extent.walk_trials,
+        seed=args.seed,
+        out=folder,
+    )
+    asked = policy_origin(policy) | {
+        "calibration_sha256": sound_origin()["calibration_sha256"],
+        "beta": args.beta,
+        "seed": args.seed,
+        "trials": options.trials,
+        "course": course.name,
+    }
+    path = folder / "asked.json"
+    if not path.is_file() or read_json(path) != asked:
+        path.unlink(missing_ok=True)
+        walk(options)
+        write_json(path, asked)
+    return read_json(folder / "walk.json")
+
+
+def _about(walker: Walker) -> dict[str, Any]:
+    """Return what the report says of one thing that walks."""
+    return {
+        "method": walker.method,
+        "policy": walker.name,
+        "sha256": walker.sha256,
+        "iteration": walker.driver.iteration,
+        "training_seed": walker.training_seed,
+    }
+
+
+def _command(args: PaperArgs) -> str:
+    """Return the command that measures the same again."""
+    words = ["python", "evaluate.py", "paper"]
+    default = PaperArgs()
+    for name in ("mute", "dreamwaq", "others", "parts"):
+        values = getattr(args, name)
+        if values != getattr(default, name) and values:
+            words += [f"--{name}", *map(str, values)]
+    for name in ("beta", "trials", "seed"):
+        if getattr(args, name) != getattr(default, name):
+            words += [f"--{name}", str(getattr(args, name))]
+    words += ["--no-mpc"] * (not args.mpc) + ["--quick"] * args.quick
+    return shlex.join(words)
+
+
+def _report(args: PaperArgs, found: dict[str, Any]) -> None:
+    """Write the data first, then the figures and the report, and print the levels."""
+    from mute.evaluation.comparison import figures  # matplotlib takes a second
+
+    out, rows, sweep = args.out, found["levels"], found["sweep"]
+    drawn: list[Path] = []
+    heard = [row for row in rows if row["mnl_mean"] is not None]
+    if heard:
+        write_csv(out / "levels.csv", rows)
+        drawn += figures.draw_speeds(heard, out) + figures.draw_front(heard, out)
+        drawn += figures.draw_sources(heard, out)
+    if any(row["mnl_mean"] is not None for row in sweep):
+        write_csv(out / "sweep.csv", sweep)
+        drawn += figures.draw_betas(sweep, out)
+    found["figures"] = [path.stem for path in drawn if path.suffix == ".png"]
+    if found["walk"] is not None and (out / "walk" / "course_map.png").is_file():
+        found["figures"].append("walk/course_map")
+    write_json(out / "comparison.json", found)
+    write_file(out / "comparison.md", comparison_report(found).encode())
+    shown = ("label", "surface", "command_speed", "speed_mean", "mnl_mean", "mnl_std", "pnl_mean")
+    if rows:
+        print_table("levels in dBA, modelled", rows, shown)
+    if not args.dreamwaq:
+        tell("DreamWaQ is left out: no policy of it ships, and --dreamwaq names none")
+    print(f"written to {out}: comparison.md, comparison.json")
