@@ -48,6 +48,12 @@ class Motion:
     """Mean over the physics steps of max(-v_z, 0)^2, world frame. Shape: (num_envs, 4)."""
     foot_raise_sq: torch.Tensor
     """Mean over the physics steps of max(v_z, 0)^2, world frame. Shape: (num_envs, 4)."""
+    foot_vel_z_substeps: torch.Tensor
+    """Vertical velocity of each foot at the physics steps of the control step, world frame.
+    Shape: (num_steps, num_envs, 4)."""
+    foot_load: torch.Tensor | None
+    """Largest vertical force of the ground on each foot in the control step, in weights of the
+    robot; None unless `scene.foot_forces`. Shape: (num_envs, 4)."""
     foot_speed_xy: torch.Tensor
     """Horizontal speed of each foot. Shape: (num_envs, 4)."""
     foot_height: torch.Tensor

@@ -289,7 +289,8 @@ class QuadrupedEnv(VecEnv):
         for listener in self.physics_listeners:
             listener()
         sensors = self._sensors
-        self.footfalls.record(sensors.foot_vel_z_substeps, sensors.foot_contact_substeps)
+        self._foot_vel_z = sensors.foot_vel_z_substeps
+        self.footfalls.record(self._foot_vel_z, sensors.foot_contact_substeps)
         if self._extra_sensors is not None:
             self._extra_sensors.end()
         self.unstable = simulation.unstable()
@@ -338,6 +339,8 @@ class QuadrupedEnv(VecEnv):
             phase=phase,
             foot_drop_sq=feet.drop_sq,
             foot_raise_sq=feet.raise_sq,
+            foot_vel_z_substeps=self._foot_vel_z,
+            foot_load=self._sensors.foot_load,
             foot_speed_xy=self._sensors.foot_vel[:, :, :2].norm(dim=2),
             foot_height=bottom - ground.feet,
             foot_lift=bottom - ground.near_feet,

@@ -78,6 +78,12 @@ class QuadrupedEnvCfg:
                 f"env.engine must be one of {', '.join(get_args(Engine))}, got {self.engine!r}"
             )
         check_ranges(self, "env", _RANGES)
+        for name, term in self.rewards.terms.items():
+            needs = term.function == "landing_load" and term.weight != 0.0
+            if needs and not self.scene.foot_forces:
+                raise ValueError(
+                    f"env.scene.foot_forces must be true for env.rewards.terms.{name}, got false"
+                )
 
     @property
     def step_dt(self) -> float:

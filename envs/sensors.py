@@ -43,6 +43,10 @@ class RobotSensors:
         """Number of contacts of trunk and head. Shape: (num_envs, 2)."""
         self.shape_contact = now("trunk_contact", NUM_SHAPES)
         """Number of contacts of every collision shape but the feet. Shape: (num_envs, 10)."""
+        force = f"{LEGS[0]}_foot_force"
+        measured = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, force) >= 0
+        self._foot_force = sensor_slice(model, force, feet) if measured else None
+        self._weight = float(model.body_mass.sum() * abs(model.opt.gravity[2]))
         simulation.record("sensordata")
         self._simulation = simulation
         self._foot_vel_z = sensor_slice(model, f"{LEGS[0]}_foot_vel", feet).start + 2
@@ -65,6 +69,19 @@ class RobotSensors:
         """
         found = self._simulation.substeps["sensordata"][:, :, self._foot_contact]
         return found.transpose(0, 1).float()
+
+    @property
+    def foot_load(self) -> torch.Tensor | None:
+        """Largest vertical force between each foot and the ground in the last step.
+
+        In weights of the robot as its model has it. Shape: (num_envs, 4); None where the scene does
+        not measure it.
+        """
+        if self._foot_force is None:
+            return None
+        columns = slice(self._foot_force.start + 2, self._foot_force.stop, 3)
+        forces = self._simulation.substeps["sensordata"][:, :, columns]
+        return forces.abs().amax(dim=1).float() / self._weight
 
 
 def sensor_slice(model: mujoco.MjModel, first_name: str, count: int) -> slice:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg
@@ -13,6 +13,7 @@ from mute.envs.commands import CommandsCfg
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
 from mute.envs.rewards import RewardsCfg, RewardTermCfg, paper_terms, reward_term
+from mute.envs.scene import SceneCfg
 from mute.networks.estimator import EstimatorCfg
 from mute.support.errors import MuteError
 
@@ -36,8 +37,18 @@ def _go1_mute_paper() -> TaskCfg:
 
 def _go1_mute() -> TaskCfg:
     """Return what works on a CPU: led to a trot that goes from a stand, then paid to be soft."""
+    return _led_to_a_trot(_quiet())
+
+
+def _led_to_a_trot(quiet: Mapping[str, RewardTermCfg], foot_forces: bool = False) -> TaskCfg:
+    """Return the recipe of `go1_mute` with some terms to be quiet by.
+
+    Args:
+        quiet: The terms by name; they take the places of the paper's.
+        foot_forces: Whether the forces on the feet are measured.
+    """
     rewards = RewardsCfg(
-        terms=paper_terms() | _following() | _stepping() | _quiet() | _upright(),
+        terms=paper_terms() | _following() | _stepping() | dict(quiet) | _upright(),
         following_time=0.2,
         following_acceleration=2.0,
         guide_ramp=(40.0, 60.0),
@@ -73,10 +84,13 @@ def _go1_mute() -> TaskCfg:
         ppo=PPOCfg(num_learning_epochs=4, desired_kl=0.016),
         estimation=EstimationCfg(robots_share=0.5, num_mini_batches=2),
     )
-    return TaskCfg(
-        env=QuadrupedEnvCfg(rewards=rewards, randomization=randomization, commands=commands),
-        agent=agent,
+    env = QuadrupedEnvCfg(
+        rewards=rewards,
+        randomization=randomization,
+        commands=commands,
+        scene=SceneCfg(foot_forces=foot_forces),
     )
+    return TaskCfg(env=env, agent=agent)
 
 
 def _go1_dreamwaq() -> TaskCfg:
@@ -117,7 +131,7 @@ def _go1_dreamwaq() -> TaskCfg:
 
 def _dreamwaq_terms() -> dict[str, RewardTermCfg]:
     """Return DreamWaQ's Table I: the paper's without phase and collision, and three of its own."""
-    without = ("foot_drop_velocity", "foot_raise_velocity", "collision")
+    without = (*_PAPERS_PHASE_TERMS, "collision")
     terms = {name: term for name, term in paper_terms().items() if name not in without}
     return terms | {
         "foot_clearance": reward_term("foot_clearance", -0.01, group="other"),
@@ -164,6 +178,29 @@ def _quiet() -> dict[str, RewardTermCfg]:
     }
 
 
+_PAPERS_PHASE_TERMS = ("foot_drop_velocity", "foot_raise_velocity")
+
+
+def _quiet_by(*terms: RewardTermCfg, foot_forces: bool = False) -> Callable[[], TaskCfg]:
+    """Return the recipe of `go1_mute`, quiet by what others have used, in place of its own terms.
+
+    What beta and its ramp scale is that alone, beside the term against stamping, without which few
+    trainings walk; the paper's phase terms are left out.
+
+    Args:
+        terms: What beta scales.
+        foot_forces: Whether the forces on the feet are measured.
+    """
+
+    def make() -> TaskCfg:
+        own = {term.function: copy.deepcopy(term) for term in terms}
+        papers = {name: reward_term(name, 0.0) for name in _PAPERS_PHASE_TERMS}
+        stamping = {"stamping": _quiet()["stamping"]}
+        return _led_to_a_trot(papers | stamping | own, foot_forces)
+
+    return make
+
+
 def _upright() -> dict[str, RewardTermCfg]:
     """Return what a robot keeps its feet under itself for."""
     return {
@@ -178,6 +215,14 @@ _TASKS: dict[str, Callable[[], TaskCfg]] = {
     "go1_mute": _go1_mute,
     "go1_mute_paper": _go1_mute_paper,
     "go1_dreamwaq": _go1_dreamwaq,
+    # Quiet terms of the literature by the same recipe. Weights are ours: each makes a landing at
+    # 0.5 m/s cost about as much.
+    "go1_quiet_phase": _quiet_by(
+        reward_term("foot_drop_velocity", -0.23), reward_term("foot_raise_velocity", 0.046)
+    ),
+    "go1_quiet_landing_speed": _quiet_by(reward_term("landing_speed", -20.0)),
+    "go1_quiet_landing_load": _quiet_by(reward_term("landing_load", -3.0), foot_forces=True),
+    "go1_quiet_speed_change": _quiet_by(reward_term("foot_speed_change", -100.0)),
 }
 
 

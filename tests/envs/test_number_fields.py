@@ -16,7 +16,10 @@ from mute.envs.rewards import RewardsCfg, reward_term
 from mute.envs.scene import FloorPatch, SceneCfg
 
 CFG = QuadrupedEnvCfg(
-    scene=SceneCfg(floor_patches=(FloorPatch((0.0, 0.0), (1.0, 1.0), 0.8, (0.02, 1.0)),)),
+    scene=SceneCfg(
+        floor_patches=(FloorPatch((0.0, 0.0), (1.0, 1.0), 0.8, (0.02, 1.0)),),
+        foot_forces=True,  # a term asks for it
+    ),
     rewards=RewardsCfg(
         terms={name: reward_term(name, 1.0) for name in REWARD_FUNCTIONS}, guide_ramp=(0.0, 1.0)
     ),

@@ -45,6 +45,20 @@ CASES = {
         [1.0 + math.exp(-1.0), 2.0],
     ),
     "landing_speed": ({"landing_speed": [[0.3, 0.4], [0, 0, 0, 2.0]]}, [0.25, 4.0]),
+    # Changes of 0.1 and then -0.4, of which 0.3 counts; and of one foot 0.2 at once.
+    "foot_speed_change": (
+        {"foot_vel_z_substeps": [[[-0.2], []], [[-0.1], [0, 0, 0, 0.2]], [[-0.5], [0, 0, 0, 0.2]]]},
+        [(0.1**2 + 0.3**2) / 2, 0.2**2 / 2],
+    ),
+    # In the air, just landed, standing, in the air; standing, but for one in the air.
+    "landing_load": (
+        {
+            "foot_load": [[0.5, 1.2, 3.0, 0.0], [1.0, 1.0, 1.0, 0.4]],
+            "contact": [[0, 1, 1, 0], [1, 1, 1, 0]],
+            "touchdown": [[0, 1, 0, 0], []],
+        },
+        [0.5**2 + 1.2**2, 0.4**2],
+    ),
     "lin_vel_z": ({"base_lin_vel": [[9.0, 9.0, -0.5], [0, 0, 2.0]]}, [0.25, 4.0]),
     "ang_vel_xy": ({"base_ang_vel": [[3.0, -4.0, 100.0], [0.0, 1.0]]}, [25.0, 1.0]),
     "joint_power": (
@@ -207,7 +221,7 @@ def test_every_parameter_of_every_function_was_tried():
     tried |= {("near_ground_drop", "depth"), ("base_height", "desired")}
     tried |= {("foot_clearance", "target"), ("touchdown_apex", "target")}
     tried |= {("stepping", "period"), ("stepping", "target"), ("feet_lifted", "speed")}
-    tried |= {("stamping", "above")}
+    tried |= {("stamping", "above"), ("foot_speed_change", "most")}
     tried |= {("soft_steps", key) for key in ("speed", "period", "target")}
     assert tried == {
         (name, key) for name, function in REWARD_FUNCTIONS.items() for key in function.parameters

@@ -68,6 +68,27 @@ def test_the_robots_sensors_follow_the_engine_and_every_physics_step_of_it():
     assert in_part  # feet, robots and times differ in their contacts
 
 
+def test_a_robot_that_stands_loads_its_feet_with_its_weight_and_one_that_lands_with_more():
+    simulation = BatchSimulation(build_scene(SceneCfg(foot_forces=True)), num_envs=2)
+    simulation.reset(torch.ones(2, dtype=torch.bool))
+    simulation.qpos[1, 2] += 0.1
+    simulation.ctrl[:] = simulation.qpos[:, 7:]
+    simulation.forward()
+    sensors = RobotSensors(simulation)
+    load, most = torch.zeros(2), torch.zeros(2)
+    for _ in range(100):
+        simulation.step(4)
+        assert sensors.foot_load is not None
+        load = sensors.foot_load.sum(dim=1)
+        most = torch.maximum(most, load)
+    assert load == pytest.approx([1.0, 1.0], abs=0.02)
+    assert most[1] > 1.3 * most[0]
+
+
+def test_without_force_sensors_there_is_no_load(model):
+    assert RobotSensors(BatchSimulation(model, num_envs=1)).foot_load is None
+
+
 def _check_against_mujoco(simulation, sensors):
     data = mujoco.MjData(simulation.model)
     for robot in range(2):

@@ -22,6 +22,7 @@ WIDTHS = {
     "phase": 4,
     "foot_drop_sq": 4,
     "foot_raise_sq": 4,
+    "foot_load": 4,
     "foot_speed_xy": 4,
     "foot_height": 4,
     "foot_lift": 4,
@@ -48,6 +49,13 @@ def make_motion(**given):
         values[name] = values[name] > 0.5
     for name in ("base_height", "collisions"):
         values[name] = torch.tensor(given.pop(name, [0.0, 0.0]))
+    # By physics step, then robot.
+    values["foot_vel_z_substeps"] = torch.tensor(
+        [
+            [_padded(row, 4) for row in rows]
+            for rows in given.pop("foot_vel_z_substeps", [[[], []], [[], []]])
+        ]
+    )
     values["fallen"] = torch.tensor(given.pop("fallen", [False, False]))
     assert not given
     return Motion(**values)

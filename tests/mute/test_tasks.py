@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 
@@ -149,3 +150,26 @@ def test_a_name_that_could_be_no_directory_or_option_is_refused(name):
     with pytest.raises(MuteError, match="a task's name must be"):
         register_task(name, TaskCfg)
     assert name not in task_names()
+
+
+QUIET = {
+    "go1_quiet_phase": {"foot_drop_velocity", "foot_raise_velocity"},
+    "go1_quiet_landing_speed": {"landing_speed"},
+    "go1_quiet_landing_load": {"landing_load"},
+    "go1_quiet_speed_change": {"foot_speed_change"},
+}
+
+
+@pytest.mark.parametrize("name", QUIET)
+def test_a_quiet_term_of_the_literature_is_all_that_beta_scales(name):
+    terms, recipe = make_task(name).env.rewards.terms, make_task(DEFAULT_TASK).env.rewards.terms
+    scaled = {key for key, term in terms.items() if term.group == "phase" and term.weight != 0.0}
+    assert scaled == QUIET[name]
+    others = {key: term for key, term in terms.items() if term.group != "phase"}
+    assert others == {key: term for key, term in recipe.items() if term.group != "phase"}
+
+
+def test_a_reward_by_the_load_of_feet_needs_what_measures_it():
+    env = make_task("go1_quiet_landing_load").env
+    with pytest.raises(ValueError, match=r"foot_forces must be true for .*landing_load"):
+        dataclasses.replace(env, scene=dataclasses.replace(env.scene, foot_forces=False))
