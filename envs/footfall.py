@@ -84,6 +84,9 @@ class Footfalls:
         self._contacts = CausalContacts(
             num_envs, _NUM_FEET, min_steps=self.min_steps, device=device
         )
+        self.vel_z = torch.zeros(1 + decimation, *shape, device=device)
+        """Vertical velocity at the last physics step before the control step and at its own, m/s.
+        Shape: (1 + decimation, num_envs, 4)."""
         self.drop_sq = torch.zeros(shape, device=device)
         """Mean over the physics steps of max(-v_z, 0)^2, (m/s)^2. Shape: (num_envs, 4)."""
         self.raise_sq = torch.zeros_like(self.drop_sq)
@@ -139,6 +142,7 @@ class Footfalls:
         torch.clamp(-foot_vel_z, min=0.0, out=self._drop[keep:])
         torch.clamp(foot_vel_z, min=0.0, out=self._raise)
         torch.gt(found, 0.0, out=self._touch[keep:])
+        self.vel_z = torch.cat((self.vel_z[-1:], foot_vel_z))
 
     def update(self, height: torch.Tensor, ground: torch.Tensor) -> None:
         """Close the control step: contacts, phase, landings and apexes.
@@ -176,6 +180,7 @@ class Footfalls:
         self._contacts.reset(mask, raw)
         self._drop.masked_fill_(column, 0.0)
         self._raise.masked_fill_(column, 0.0)
+        self.vel_z = self.vel_z.masked_fill(column, 0.0)
         torch.where(column, raw, self._touch, out=self._touch)
         self.raw_contact = torch.where(column, raw, self.raw_contact)
         for name in ("drop_sq", "raise_sq", "contact_share", "landing_speed", "swing_apex"):
@@ -193,7 +198,8 @@ class Footfalls:
         """Continue from a `state_dict`."""
         apex = state["swing_apex"]
         # Earlier versions have an apex above level ground alone.
-        state = {"_highest": apex, "_highest_ground": torch.zeros_like(apex)} | state
+        known = {"_highest": apex, "_highest_ground": torch.zeros_like(apex), "vel_z": self.vel_z}
+        state = known | state
         for name in _STATE_TENSORS:
             setattr(self, name, state[name].to(self._drop.device, copy=True))
         prefix = "contacts/"
@@ -217,6 +223,7 @@ class Footfalls:
 
 
 _STATE_TENSORS = (
+    "vel_z",
     "_drop",
     "_touch",
     "drop_sq",

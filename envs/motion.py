@@ -49,8 +49,8 @@ class Motion:
     foot_raise_sq: torch.Tensor
     """Mean over the physics steps of max(v_z, 0)^2, world frame. Shape: (num_envs, 4)."""
     foot_vel_z_substeps: torch.Tensor
-    """Vertical velocity of each foot at the physics steps of the control step, world frame.
-    Shape: (num_steps, num_envs, 4)."""
+    """Vertical velocity of each foot at the last physics step before the control step and at its
+    own, world frame. Shape: (1 + num_steps, num_envs, 4)."""
     foot_load: torch.Tensor | None
     """Largest vertical force of the ground on each foot in the control step, in weights of the
     robot; None unless `scene.foot_forces`. Shape: (num_envs, 4)."""

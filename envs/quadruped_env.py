@@ -289,8 +289,7 @@ class QuadrupedEnv(VecEnv):
         for listener in self.physics_listeners:
             listener()
         sensors = self._sensors
-        self._foot_vel_z = sensors.foot_vel_z_substeps
-        self.footfalls.record(self._foot_vel_z, sensors.foot_contact_substeps)
+        self.footfalls.record(sensors.foot_vel_z_substeps, sensors.foot_contact_substeps)
         if self._extra_sensors is not None:
             self._extra_sensors.end()
         self.unstable = simulation.unstable()
@@ -315,6 +314,7 @@ class QuadrupedEnv(VecEnv):
         ground = self.ground.below(foot_pos[:, :, :2], self.base_pos[:, :2])
         bottom = foot_pos[:, :, 2] - FOOT_RADIUS
         feet.update(bottom, ground.near_feet)
+        load = self._sensors.foot_load
         joint_acc = (self.joint_vel - self.last_joint_vel) / self.step_dt
         self.last_joint_vel = self.joint_vel.clone()
         torque = self.simulation.actuator_force
@@ -339,8 +339,8 @@ class QuadrupedEnv(VecEnv):
             phase=phase,
             foot_drop_sq=feet.drop_sq,
             foot_raise_sq=feet.raise_sq,
-            foot_vel_z_substeps=self._foot_vel_z,
-            foot_load=self._sensors.foot_load,
+            foot_vel_z_substeps=feet.vel_z,
+            foot_load=None if load is None else load.masked_fill(self.unstable[:, None], 0.0),
             foot_speed_xy=self._sensors.foot_vel[:, :, :2].norm(dim=2),
             foot_height=bottom - ground.feet,
             foot_lift=bottom - ground.near_feet,

@@ -220,8 +220,8 @@ def landing_speed(motion: Motion) -> torch.Tensor:
 def foot_speed_change(motion: Motion, most: float) -> torch.Tensor:
     """Penalise feet whose vertical speed changes, as a blow makes it, up to a bound.
 
-    Sum over feet of the mean of min(change, most)^2 between the physics steps of a control step;
-    after Mueller et al., "Olaf", 2025 (arXiv 2512.16705), who take it between control steps.
+    Sum over feet of the mean of min(change, most)^2 from each physics step to the next; after
+    Mueller et al., "Olaf", 2025 (arXiv 2512.16705), who take it between control steps.
     """
     change = motion.foot_vel_z_substeps.diff(dim=0).abs().clamp(max=most)
     return change.square().mean(dim=0).sum(dim=1)
@@ -231,13 +231,13 @@ def foot_speed_change(motion: Motion, most: float) -> torch.Tensor:
 def landing_load(motion: Motion) -> torch.Tensor:
     """Penalise feet by the force that they land with, in weights of the robot, squared.
 
-    Sum over the feet that were in the air, or were just found to have landed, of the largest
-    vertical force in the control step; after Hu et al., "QuietWalk", 2026 (arXiv 2604.23702), who
-    estimate it. Needs `env.scene.foot_forces`.
+    Sum over the feet that are not known to stand yet of the largest vertical force in the control
+    step; after Hu et al., "QuietWalk", 2026 (arXiv 2604.23702), who estimate it. Needs
+    `env.scene.foot_forces`.
     """
     assert motion.foot_load is not None  # the environment's configuration sees to it
-    landing = ~motion.contact | motion.touchdown
-    return (motion.foot_load.square() * landing).sum(dim=1)
+    # A foot is known to stand some physics steps after the blow, and carries the robot by then.
+    return (motion.foot_load.square() * ~motion.contact).sum(dim=1)
 
 
 @register_term()

@@ -70,7 +70,8 @@ def audible_cfg(cfg: QuadrupedEnvCfg, surface: str | None) -> QuadrupedEnvCfg:
         return listening_cfg(cfg, surface)
     rate = round(1.0 / cfg.scene.timestep)
     readable = rate >= READINGS_PER_SECOND and abs(rate * cfg.scene.timestep - 1.0) < 1e-6
-    return dataclasses.replace(cfg, scene=dataclasses.replace(cfg.scene, foot_forces=readable))
+    forces = readable or cfg.scene.foot_forces  # a reward may ask for them
+    return dataclasses.replace(cfg, scene=dataclasses.replace(cfg.scene, foot_forces=forces))
 
 
 def make_listening_env(cfg: QuadrupedEnvCfg, surface: str) -> QuadrupedEnv:

@@ -83,7 +83,8 @@ def _verdicts_table(told: Sequence[Any]) -> str:
 
 
 def _levels_text(found: Mapping[str, Any]) -> str:
-    several = max(len(row.trainings) for row in _table_levels(found["levels"])) > 1
+    trainings = (len(row.trainings) for row in _table_levels(found["levels"]))
+    several = max(trainings, default=1) > 1
     over = (
         " Of several trainings it is the mean, and their smallest and largest are in brackets."
         if several
@@ -176,6 +177,13 @@ def _sweep_table(sweep: Sequence[Row]) -> str:
     return f"On wood, asked for {asked:g} m/s.\n\n" + markdown(sweep, columns)
 
 
+def _time_of(walk: Row) -> str:
+    """Return how long the robot that is drawn took, if it arrived."""
+    if walk["end"] != "arrived":
+        return ""
+    return f", the one drawn in {walk['seconds']:.0f} s (the paper's {PAPER_WALK['seconds']:.0f} s)"
+
+
 def _walk_text(walk: Row) -> str:
     mnl, pnl = (
         "none heard" if walk[f"{name}_mean"] is None else f"{walk[f'{name}_mean']:.1f} dBA"
@@ -183,8 +191,7 @@ def _walk_text(walk: Row) -> str:
     )
     return (
         f"{walk['path_length']:.1f} m over mixed floors, asked for {walk['course_speed']:g} m/s at "
-        f"beta {walk['beta']:g}: {walk['arrived']} of {walk['trials']} robots arrived, the first "
-        f"in {walk['seconds']:.0f} s (the paper's {PAPER_WALK['seconds']:.0f} s); MNL {mnl}, PNL "
-        f"{pnl}; the paper's {PAPER_WALK['mnl']:.1f} and {PAPER_WALK['pnl']:.1f} dBA, at a beta "
-        "that it does not name."
+        f"beta {walk['beta']:g}: {walk['arrived']} of {walk['trials']} robots arrived"
+        f"{_time_of(walk)}; MNL {mnl}, PNL {pnl}; the paper's {PAPER_WALK['mnl']:.1f} and "
+        f"{PAPER_WALK['pnl']:.1f} dBA, at a beta that it does not name."
     )

@@ -116,4 +116,4 @@ def _speeds(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _scaled(row: Mapping[str, Any]) -> dict[str, float | None]:
-    return {name: times(row[of], 1e3) for name, of in _IN_UNITS.items()}
+    return {name: times(row.get(of), 1e3) for name, of in _IN_UNITS.items()}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
+import json
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -32,6 +34,7 @@ from mute.evaluation.tables import print_table, read_json, write_csv, write_json
 from mute.support.errors import MuteError
 from mute.support.files import write_file
 from mute.support.plain_data import without_nan
+from mute.support.provenance import file_sha256
 from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK
@@ -99,7 +102,7 @@ def paper(args: PaperArgs) -> None:
     torch.set_num_threads(1)  # the physics engine has the cores
     kept = Kept(args.out / "measured", origin)
     rows = _measured(args, jobs(walkers, args.extent, args.parts), kept)
-    walked = _walked(args) if "walk" in args.parts else None
+    walked = _walked(args, origin) if "walk" in args.parts else None
     found: dict[str, Any] = {
         "command": _command(args),
         "quick": args.quick,
@@ -110,9 +113,9 @@ def paper(args: PaperArgs) -> None:
         "walkers": [_about(walker) for walker in walkers],
         "levels": [row for row in rows if row["part"] == "levels"],
         "sweep": [row for row in rows if row["part"] == "sweep"],
-        "walk": walked,
+        "walk": None if walked is None else read_json(walked / "walk.json"),
     }
-    _report(args, without_nan(found))
+    _report(args, without_nan(found), walked)
 
 
 def _check(args: PaperArgs) -> None:
@@ -146,7 +149,28 @@ def _walkers(args: PaperArgs) -> list[Walker]:
         walkers.append(
             Walker(method or policy.task, policy, origin["policy"], origin["policy_sha256"])
         )
+    _check_methods(walkers)
     return walkers
+
+
+def _check_methods(walkers: Sequence[Walker]) -> None:
+    """Check that policies are of the methods that they are named for.
+
+    Raises:
+        MuteError: If one of MUTE's knows no quiet factor, one of DreamWaQ's does, or those of one
+            method are of several tasks.
+    """
+    for method, option, quiet in ((MUTE, "mute", True), (DREAMWAQ, "dreamwaq", False)):
+        own = [walker for walker in walkers if walker.method == method]
+        for walker in own:
+            if walker.driver.quiet_factor != quiet:
+                knows = "knows no" if quiet else "knows a"
+                raise MuteError(
+                    f"--{option} {walker.name} {knows} quiet factor; compare it by --others"
+                )
+        tasks = sorted({walker.driver.task for walker in own})
+        if len(tasks) > 1:
+            raise MuteError(f"--{option} must be trainings of one task, got {', '.join(tasks)}")
 
 
 def _measured(args: PaperArgs, wanted: Sequence[Job], kept: Kept) -> list[dict[str, Any]]:
@@ -164,35 +188,40 @@ def _measured(args: PaperArgs, wanted: Sequence[Job], kept: Kept) -> list[dict[s
                 kept.write(each, measured)
                 rows += without_nan(measured)
             else:
-                rows += before
+                rows += [row | {"policy": job.walker.name} for row in before]
     return rows
 
 
-def _walked(args: PaperArgs) -> Mapping[str, Any]:
-    """Return what came of the long walk of the first of MUTE's policies, made before or now."""
-    folder, policy = args.out / "walk", args.mute[0]
+def _walked(args: PaperArgs, origin: Mapping[str, str]) -> Path:
+    """Return the folder of the long walk of the first of MUTE's policies, made before or now."""
+    policy = args.mute[0]
     course = _COURSES / ("short.yaml" if args.quick else "office.yaml")
-    options = WalkArgs(
-        policy=policy,
-        course=course,
-        beta=args.beta,
-        trials=args.extent.walk_trials,
-        seed=args.seed,
-        out=folder,
-    )
-    asked = policy_origin(policy) | {
-        "calibration_sha256": sound_origin()["calibration_sha256"],
+    trials = args.extent.walk_trials
+    asked = {
+        **policy_origin(policy),
+        **origin,
+        "course_sha256": file_sha256(course),
         "beta": args.beta,
         "seed": args.seed,
-        "trials": options.trials,
-        "course": course.name,
+        "trials": trials,
     }
-    path = folder / "asked.json"
-    if not path.is_file() or read_json(path) != asked:
-        path.unlink(missing_ok=True)
-        walk(options)
-        write_json(path, asked)
-    return read_json(folder / "walk.json")
+    del asked["policy"]  # wherever the same file lies
+    digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
+    folder = args.out / "walks" / digest[:16]
+    done = folder / "done"  # what is there without was stopped
+    if not done.is_file():
+        walk(
+            WalkArgs(
+                policy=policy,
+                course=course,
+                beta=args.beta,
+                trials=trials,
+                seed=args.seed,
+                out=folder,
+            )
+        )
+        write_file(done, b"")
+    return folder
 
 
 def _about(walker: Walker) -> dict[str, Any]:
@@ -212,7 +241,7 @@ def _command(args: PaperArgs) -> str:
     default = PaperArgs()
     for name in ("mute", "dreamwaq", "others", "parts"):
         values = getattr(args, name)
-        if values != getattr(default, name) and values:
+        if values != getattr(default, name):
             words += [f"--{name}", *map(str, values)]
     for name in ("beta", "trials", "seed"):
         if getattr(args, name) != getattr(default, name):
@@ -221,23 +250,27 @@ def _command(args: PaperArgs) -> str:
     return shlex.join(words)
 
 
-def _report(args: PaperArgs, found: dict[str, Any]) -> None:
-    """Write the data first, then the figures and the report, and print the levels."""
+def _report(args: PaperArgs, found: dict[str, Any], walked: Path | None) -> None:
+    """Write the data first, then the figures and the report, and print the levels.
+
+    Args:
+        args: What was asked for.
+        found: What was measured.
+        walked: Folder of the long walk, if it was walked.
+    """
     from mute.evaluation.comparison import figures  # matplotlib takes a second
 
     out, rows, sweep = args.out, found["levels"], found["sweep"]
     drawn: list[Path] = []
-    heard = [row for row in rows if row["mnl_mean"] is not None]
-    if heard:
+    if rows:
         write_csv(out / "levels.csv", rows)
-        drawn += figures.draw_speeds(heard, out) + figures.draw_front(heard, out)
-        drawn += figures.draw_sources(heard, out)
+        drawn += figures.draw_levels(rows, out)
     if any(row["mnl_mean"] is not None for row in sweep):
         write_csv(out / "sweep.csv", sweep)
         drawn += figures.draw_betas(sweep, out)
     found["figures"] = [path.stem for path in drawn if path.suffix == ".png"]
-    if found["walk"] is not None and (out / "walk" / "course_map.png").is_file():
-        found["figures"].append("walk/course_map")
+    if walked is not None and (walked / "course_map.png").is_file():
+        found["figures"].append(f"{walked.relative_to(out).as_posix()}/course_map")
     write_json(out / "comparison.json", found)
     write_file(out / "comparison.md", comparison_report(found).encode())
     shown = ("label", "surface", "command_speed", "speed_mean", "mnl_mean", "mnl_std", "pnl_mean")

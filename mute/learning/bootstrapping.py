@@ -88,10 +88,15 @@ class AdaptiveBootstrap:
         self.probability = state["probability"]
 
     def _variation(self) -> Tensor:
-        """Return the coefficient of variation of the returns; infinite while they are unknown."""
+        """Return the coefficient of variation of the returns.
+
+        Infinite until half of the robots have ended an episode: a few alike would have all learn
+        from an estimator that has learnt nothing.
+        """
         returns = self._returns.double() * self._known
         sums = torch.stack((self._known.sum().double(), returns.sum(), returns.square().sum()))
         count, total, squares = self._ranks.mean(sums)
         mean = total / count
         variance = (squares / count - mean.square()).clamp(min=0.0)
-        return torch.nan_to_num(variance.sqrt() / mean.abs(), nan=torch.inf)
+        variation = torch.nan_to_num(variance.sqrt() / mean.abs(), nan=torch.inf)
+        return torch.where(count < 0.5 * len(self._known), torch.inf, variation)

@@ -37,6 +37,7 @@ _MODULES = {
     "-m benchmarks.make_peers": "benchmarks.make_peers",
     "-m benchmarks.peer_walks": "benchmarks.peer_walks",
     "-m benchmarks.physics": "benchmarks.physics",
+    "-m benchmarks.quiet_terms": "benchmarks.quiet_terms",
     "-m benchmarks.sound": "benchmarks.sound",
     "-m benchmarks.terrain": "benchmarks.terrain",
     "examples/listen.py": "listen",

@@ -7,6 +7,7 @@ import math
 import mujoco
 import numpy as np
 import pytest
+from places import REPOSITORY
 
 from mute.envs.scene import (
     FOOT_RADIUS,
@@ -473,3 +474,13 @@ def test_a_scene_that_nobody_sees_has_the_shapes_that_collide_and_the_same_physi
         np.testing.assert_array_equal(getattr(stepped, name), getattr(seen, name), name)
     for name in ("geom_size", "geom_friction", "geom_solref", "geom_pos"):
         np.testing.assert_array_equal(getattr(stepped, name), getattr(seen, name)[collides], name)
+
+
+def test_the_gains_are_the_robots_own_unless_others_are_asked_for():
+    own = mujoco.MjModel.from_xml_path(str(REPOSITORY / "resources" / "go1" / "go1.xml"))
+    usual, stiff = (build_scene(cfg) for cfg in (SceneCfg(), SceneCfg(stiffness=28.0, damping=0.7)))
+    for name in ("actuator_gainprm", "actuator_biasprm"):
+        np.testing.assert_array_equal(getattr(usual, name), getattr(own, name))
+    assert set(stiff.actuator_gainprm[:, 0]) == {28.0}
+    assert set(stiff.actuator_biasprm[:, 1]) == {-28.0}
+    assert set(stiff.actuator_biasprm[:, 2]) == {-0.7}

@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from mute.envs.batch_simulation import BatchSimulation
+from mute.envs.footfall import FootfallCfg, Footfalls
 from mute.envs.scene import LEGS, SceneCfg, build_scene, make_spec
 from mute.envs.sensors import RobotSensors, sensor_slice
 
@@ -83,6 +84,21 @@ def test_a_robot_that_stands_loads_its_feet_with_its_weight_and_one_that_lands_w
         most = torch.maximum(most, load)
     assert load == pytest.approx([1.0, 1.0], abs=0.02)
     assert most[1] > 1.3 * most[0]
+
+
+def test_the_last_velocity_before_a_control_step_comes_first():
+    feet = Footfalls(FootfallCfg(), 1, timestep=0.005, decimation=2)
+    contacts = torch.zeros(2, 1, 4)
+    first, second = torch.randn(2, 2, 1, 4)
+    feet.record(first, contacts)
+    assert torch.equal(feet.vel_z, torch.cat((torch.zeros(1, 1, 4), first)))
+    feet.record(second, contacts)
+    assert torch.equal(feet.vel_z, torch.cat((first[-1:], second)))
+    other = Footfalls(FootfallCfg(), 1, timestep=0.005, decimation=2)
+    other.load_state_dict(feet.state_dict())
+    assert torch.equal(other.vel_z, feet.vel_z)
+    feet.reset(torch.tensor([True]), torch.zeros(1, 4))
+    assert not bool(feet.vel_z.any())
 
 
 def test_without_force_sensors_there_is_no_load(model):

@@ -138,8 +138,10 @@ def verdicts(
     found += _headline(rows)
     found += _monotone(sweep)
     if walk is not None and walk["mnl_mean"] is not None:
-        mnl = walk["mnl_mean"]
-        found.append(Verdict("the long walk is under 70 dBA", f"{mnl:.1f} dBA", mnl < 70.0))
+        mnl, arrived, trials = walk["mnl_mean"], walk["arrived"], walk["trials"]
+        text = f"{mnl:.1f} dBA, {arrived} of {trials} arrived"
+        holds = mnl < 70.0 and arrived == trials
+        found.append(Verdict("the long walk ends, and is under 70 dBA", text, holds))
     return found
 
 

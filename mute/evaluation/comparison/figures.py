@@ -17,12 +17,26 @@ from mute.evaluation.comparison.conclusions import EQUAL_SPEED, labels, pareto_f
 from mute.evaluation.noise_figures import save_figure
 from mute.evaluation.plotting import COLOURS, STYLE
 
-__all__ = ["draw_betas", "draw_front", "draw_sources", "draw_speeds"]
+__all__ = ["draw_betas", "draw_levels"]
 
 Row = Mapping[str, Any]
 
 
-def draw_speeds(rows: Sequence[Row], directory: Path) -> list[Path]:
+def draw_levels(rows: Sequence[Row], directory: Path) -> list[Path]:
+    """Draw levels on wood against speed, their front and their sources; return the files.
+
+    Nothing is drawn where nothing was heard there.
+    """
+    if not _coloured(rows):
+        return []
+    return [
+        *_draw_speeds(rows, directory),
+        *_draw_front(rows, directory),
+        *_draw_sources(rows, directory),
+    ]
+
+
+def _draw_speeds(rows: Sequence[Row], directory: Path) -> list[Path]:
     """Draw levels on wood against the actual speed, a line a label; return the files."""
     with mpl.rc_context(STYLE):
         figure, axes = _axes()
@@ -63,7 +77,7 @@ def draw_betas(sweep: Sequence[Row], directory: Path) -> list[Path]:
         return save_figure(figure, directory / "beta")
 
 
-def draw_front(rows: Sequence[Row], directory: Path) -> list[Path]:
+def _draw_front(rows: Sequence[Row], directory: Path) -> list[Path]:
     """Draw every setting on wood by actual speed and level, and the front; return the files."""
     with mpl.rc_context(STYLE):
         figure, axes = _axes()
@@ -80,7 +94,7 @@ def draw_front(rows: Sequence[Row], directory: Path) -> list[Path]:
         return save_figure(figure, directory / "front")
 
 
-def draw_sources(rows: Sequence[Row], directory: Path) -> list[Path]:
+def _draw_sources(rows: Sequence[Row], directory: Path) -> list[Path]:
     """Draw where the noise comes from on wood, a group of bars a label; return the files."""
     with mpl.rc_context(STYLE):
         figure, axes = _axes()

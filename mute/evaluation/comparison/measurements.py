@@ -156,7 +156,8 @@ class Kept:
 
         Args:
             folder: The folder; it is there.
-            origin: What all of them rest on; those of another calibration are not read back.
+            origin: What all of them rest on; those of another commit, calibration or machine are
+                not read back.
         """
         self._folder = folder
         self._origin = dict(origin)
@@ -172,8 +173,7 @@ class Kept:
             "trials": extent.trials,
             "seconds": extent.seconds,
             "seed": seed,
-            "calibration_sha256": self._origin["calibration_sha256"],
-        }
+        } | self._origin
 
     def read(self, asked: Mapping[str, Any]) -> list[dict[str, Any]] | None:
         """Return the rows of a measurement that was made; None if it was not."""
@@ -189,7 +189,7 @@ class Kept:
         Raises:
             DiskError: If they cannot be written.
         """
-        write_json(self._path(asked), {"asked": asked, "origin": self._origin, "rows": list(rows)})
+        write_json(self._path(asked), {"asked": asked, "rows": list(rows)})
 
     def _path(self, asked: Mapping[str, Any]) -> Path:
         text = json.dumps(asked, sort_keys=True).encode()

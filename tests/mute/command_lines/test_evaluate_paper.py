@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from dreamwaq_helpers import write_dreamwaq_policy
 from places import SHIPPED_POLICY
 
 from mute.command_lines import evaluate, evaluate_paper
@@ -74,7 +75,8 @@ def test_all_of_it_really_runs_in_small_and_is_read_back_the_second_time(
     for name in found["figures"]:
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         assert f"({name}.png)" in report
-    assert {"speed", "front", "sources", "beta", "walk/course_map"} == set(found["figures"])
+    drawn = {name.rpartition("/")[2] for name in found["figures"]}
+    assert drawn == {"speed", "front", "sources", "beta", "course_map"}
     assert comparison_report(found) == report
 
     def never(*_: Any) -> None:
@@ -108,15 +110,18 @@ def test_what_was_stopped_goes_on_where_it_was(tmp_path, measured, monkeypatch):
 
 
 def test_the_report_of_the_same_figures_is_the_same_byte_for_byte(tmp_path, measured):
+    dreamwaq = write_dreamwaq_policy(tmp_path / "dreamwaq.pt")
     for name in ("one", "two"):
         words = ["paper", "--parts", "levels,sweep", "--out", str(tmp_path / name)]
-        assert evaluate.main([*words, "--dreamwaq", str(SHIPPED_POLICY)]) == 0
+        assert evaluate.main([*words, "--dreamwaq", str(dreamwaq)]) == 0
     one, two = (tmp_path / name for name in ("one", "two"))
     for name in ("comparison.md", "comparison.json", "levels.csv", "speed.png", "front.svg"):
         assert (one / name).read_bytes() == (two / name).read_bytes()
     report = (one / "comparison.md").read_text()
     # 69 dBA and half a dBA for the speed; the paper's 68.61.
     assert "| MUTE, beta 0 | wood | 69.5 ± 0.4 | 68.6 | +0.9 |" in report
+    assert "| DreamWaQ | tile | 72.5 ± 0.4 | 72.3 | +0.2 |" in report
+    assert "| MPC > DreamWaQ > MUTE, beta 0 > MUTE, beta 1 on wood | 75.5 > 72.5 >" in report
     assert "| quieter at every step of beta, 0.8 m/s on wood | 10 of 10 steps" in report
     assert "python evaluate.py paper --dreamwaq" in report
 
@@ -135,6 +140,52 @@ def test_other_tasks_are_compared_under_their_names(tmp_path, measured):
     words = ["paper", "--no-mpc", "--parts", "levels", "--out", str(tmp_path)]
     assert evaluate.main([*words, "--others", str(SHIPPED_POLICY)]) == 0
     assert "go1_mute, beta 0" in {row["label"] for row in _found(tmp_path)["levels"]}
+
+
+def test_a_floor_that_nothing_was_heard_on_has_no_level_and_no_figure(
+    tmp_path, measured, monkeypatch
+):
+    measure = evaluate_paper.measure
+    unheard = dict.fromkeys(("mnl_mean", "mnl_std", "pnl_mean", "pnl_std"), None)
+
+    def silent(*asked: Any) -> list[dict[str, Any]]:
+        return [row | unheard for row in measure(*asked)]
+
+    monkeypatch.setattr(evaluate_paper, "measure", silent)
+    words = ["paper", "--no-mpc", "--parts", "levels,sweep", "--out", str(tmp_path)]
+    assert evaluate.main(words) == 0
+    assert _found(tmp_path)["figures"] == []
+    assert "| MUTE, beta 0 | wood | - | 68.6 | - |" in (tmp_path / "comparison.md").read_text()
+
+
+def test_a_policy_is_refused_under_the_name_of_another_method(tmp_path, measured):
+    dreamwaq = str(write_dreamwaq_policy(tmp_path / "dreamwaq.pt"))
+    words = ["paper", "--no-mpc", "--out", str(tmp_path)]
+    with pytest.raises(MuteError, match=r"--mute .*dreamwaq\.pt knows no quiet factor"):
+        evaluate.main([*words, "--mute", dreamwaq])
+    with pytest.raises(MuteError, match=r"--dreamwaq .*go1_mute\.pt knows a quiet factor"):
+        evaluate.main([*words, "--dreamwaq", str(SHIPPED_POLICY)])
+    assert measured == []
+
+
+def test_two_walks_that_differ_are_both_kept(tmp_path, monkeypatch):
+    walked: list[tuple[Path, float]] = []
+
+    def walk(asked) -> None:
+        walked.append((asked.out, asked.beta))
+        asked.out.mkdir(parents=True)
+        figures = {"mnl_mean": 66.0, "pnl_mean": 70.0, "arrived": 1, "trials": 1, "end": "fell"}
+        figures |= {"path_length": 3.0, "course_speed": 0.5, "beta": asked.beta, "seconds": 9.0}
+        (asked.out / "walk.json").write_text(json.dumps(figures))
+
+    monkeypatch.setattr(evaluate_paper, "walk", walk)
+    words = ["paper", "--quick", "--no-mpc", "--parts", "walk", "--out", str(tmp_path)]
+    for beta in ("0.5", "1", "0.5"):
+        assert evaluate.main([*words, "--beta", beta]) == 0
+    assert [beta for _, beta in walked] == [0.5, 1.0]
+    assert len({folder for folder, _ in walked}) == 2
+    report = (tmp_path / "comparison.md").read_text()
+    assert "1 of 1 robots arrived; MNL 66.0 dBA" in report  # the one drawn did not
 
 
 @pytest.mark.parametrize(

@@ -53,6 +53,14 @@ def test_only_robots_that_have_ended_an_episode_are_counted():
     assert bootstrap.probability == pytest.approx(1.0 - math.tanh(0.5), abs=1e-6)
 
 
+def test_until_half_of_the_robots_have_ended_an_episode_all_see_the_truth():
+    bootstrap = AdaptiveBootstrap(5, CPU)
+    bootstrap.record(torch.ones(5), torch.tensor([True, True, False, False, False]))
+    bootstrap.draw()
+    assert bootstrap.probability == 0.0
+    assert bool(bootstrap.told.all())
+
+
 def test_a_robot_counts_by_its_last_episode():
     bootstrap = AdaptiveBootstrap(2, CPU)
     all_end = torch.ones(2, dtype=torch.bool)

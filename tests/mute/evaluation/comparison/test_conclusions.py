@@ -107,7 +107,7 @@ def test_verdicts_say_what_holds_and_what_does_not():
         make_row("MUTE", mnl, beta=beta, command=0.8)
         for beta, mnl in ((0.0, 70.0), (0.5, 67.0), (1.0, 67.5))
     ]
-    found = {one.claim: one for one in verdicts(rows, sweep, {"mnl_mean": 70.5})}
+    found = {one.claim: one for one in verdicts(rows, sweep, _walk(70.5))}
     order = "MPC > DreamWaQ > MUTE, beta 0 > MUTE, beta 1 on"
     assert found[f"{order} wood"].holds
     assert not found[f"{order} tile"].holds
@@ -118,10 +118,24 @@ def test_verdicts_say_what_holds_and_what_does_not():
     quieter = found["quieter at every step of beta, 0.8 m/s on wood"]
     assert quieter.figure == "1 of 2 steps, 70.0 to 67.5 dBA"
     assert not quieter.holds
-    assert not found["the long walk is under 70 dBA"].holds
+    assert not found[_WALK].holds
+
+
+_WALK = "the long walk ends, and is under 70 dBA"
+
+
+def _walk(mnl: float | None, arrived: int = 16) -> dict[str, Any]:
+    return {"mnl_mean": mnl, "arrived": arrived, "trials": 16}
+
+
+@pytest.mark.parametrize(("mnl", "arrived", "holds"), [(69.0, 16, True), (69.0, 15, False)])
+def test_a_walk_that_not_all_finish_is_no_quiet_walk(mnl, arrived, holds):
+    (found,) = verdicts([], [], _walk(mnl, arrived))
+    assert (found.claim, found.holds) == (_WALK, holds)
+    assert found.figure == f"69.0 dBA, {arrived} of 16 arrived"
 
 
 def test_nothing_is_said_of_what_was_not_measured():
     rows = [*_floors("MUTE, beta 0", 69.0, 68.0, 70.0)]
     assert verdicts(rows, [], None) == []
-    assert verdicts([], [], {"mnl_mean": None}) == []
+    assert verdicts([], [], _walk(None)) == []

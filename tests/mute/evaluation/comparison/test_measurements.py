@@ -58,7 +58,7 @@ def test_rows_are_read_back_for_the_very_same_measurement_alone(tmp_path):
     asked = kept.asked(job, QUICK, 1)
     assert kept.read(asked) is None
     kept.write(asked, [{"mnl_mean": 60.0}])
-    assert Kept(tmp_path, {"calibration_sha256": "c", "commit": "y"}).read(asked) == [
+    assert Kept(tmp_path, {"calibration_sha256": "c", "commit": "x"}).read(asked) == [
         {"mnl_mean": 60.0}
     ]
     other = dataclasses.replace(job, walker=_make_walker(MUTE, "2"))
@@ -66,7 +66,8 @@ def test_rows_are_read_back_for_the_very_same_measurement_alone(tmp_path):
         kept.asked(job, QUICK, 2),
         kept.asked(job, QUICK.with_trials(3), 1),
         kept.asked(other, QUICK, 1),
-        Kept(tmp_path, {"calibration_sha256": "d"}).asked(job, QUICK, 1),
+        Kept(tmp_path, {"calibration_sha256": "d", "commit": "x"}).asked(job, QUICK, 1),
+        Kept(tmp_path, {"calibration_sha256": "c", "commit": "y"}).asked(job, QUICK, 1),
     ]
     assert all(kept.read(each) is None for each in changed)
 
