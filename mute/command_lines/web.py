@@ -1,0 +1,51 @@
+"""Write the assets of the page: python -m mute.web --out web/assets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mute.command_lines.arguments import command_line, make_directory, parse
+from mute.command_lines.policy_options import PolicyArgs, check_audible
+from mute.controllers import load_policy
+from mute.support.errors import MuteError
+from mute.web.assets import write_assets
+
+__all__ = ["WebArgs", "main"]
+
+
+@dataclass
+class WebArgs(PolicyArgs):
+    """Arguments of the command line."""
+
+    out: Path = Path("web/assets")
+    """Directory of the page's assets, whose files are replaced."""
+    reference: Path | None = None
+    """Walk in Python as well, and keep in this directory what the page's tests hold it to; needs
+    the extra `onnx`."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    Raises:
+        MuteError: If the policy cannot be used, or a file cannot be written.
+    """
+    argv = command_line() if argv is None else argv
+    args = parse(WebArgs, argv, "Write what the page in web/ needs of Python.")
+    args = args.with_policy_found()
+    policy = load_policy(args.policy)
+    check_audible(policy, str(args.policy))
+    make_directory(args.out)
+    files = write_assets(policy, args.out)
+    if args.reference is not None:
+        make_directory(args.reference, "reference")
+        try:
+            from mute.web.reference_walks import write_reference
+        except ModuleNotFoundError as error:
+            raise MuteError(f"--reference needs the package {error.name}") from error
+        files += write_reference(policy, args.policy, args.reference)
+    for file in files:
+        print(f"wrote {file}")
+    return 0
