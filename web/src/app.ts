@@ -38,6 +38,9 @@ const PUSH = 1;
 /** Times a second that figures are shown. */
 const SHOWN = 4;
 
+/** Time between two looks at the clock, ms. */
+const TICK = 8;
+
 export class App implements PanelActions {
   private readonly walk: Walk;
   private readonly steering: Steering;
@@ -54,7 +57,7 @@ export class App implements PanelActions {
   private levels: Levels = { level: NaN, mnl: NaN, pnl: NaN, seconds: 0 };
   private settings: Settings;
   private pushes = 0;
-  private sinceShown = 0;
+  private shown = 0;
   private steps = 0;
   private heldBack = 0;
   private addressDue = false;
@@ -90,10 +93,16 @@ export class App implements PanelActions {
 
   /** Begins to walk, and goes on until the page is closed. */
   run(): void {
-    const frame = (milliseconds: number) => {
+    // Not with the pictures: a machine that draws slowly still walks at the speed of real time.
+    setInterval(() => {
+      if (!document.hidden) this.advance(performance.now() / 1000);
+    }, TICK);
+    let before = performance.now();
+    const frame = (now: number) => {
       requestAnimationFrame(frame);
       if (document.hidden) return;
-      this.frame(milliseconds / 1000);
+      this.draw(now / 1000, (now - before) / 1000);
+      before = now;
     };
     requestAnimationFrame(frame);
   }
@@ -201,16 +210,18 @@ export class App implements PanelActions {
 
   // -- the walk ------------------------------------------------------------------------------------
 
-  private frame(now: number): void {
-    const { walk, clock } = this;
+  private advance(now: number): void {
     this.gamepad.poll();
-    const { due, seconds, share } = clock.tick(now, walk.stepTime);
+    const due = this.clock.tick(now, this.walk.stepTime);
     for (let i = 0; i < due; i++) this.step();
     this.controlRate.add(now, due);
+    if ((now - this.shown) * SHOWN >= 1) this.showFigures(now);
+  }
+
+  private draw(now: number, seconds: number): void {
     this.pictureRate.add(now, 1);
+    const share = this.clock.share(now, this.walk.stepTime);
     this.parts.picture?.draw(share, this.parts.simulation, seconds);
-    this.sinceShown += seconds;
-    if (this.sinceShown * SHOWN >= 1) this.showFigures();
   }
 
   private step(): void {
@@ -379,6 +390,7 @@ export class App implements PanelActions {
     this.clock.reset();
     this.controlRate.reset();
     this.pictureRate.reset();
+    this.parts.picture?.forget();
     if (!this.isHearing || !this.hearing) return;
     const change = document.hidden ? this.hearing.suspend() : this.hearing.resume();
     change.catch((error: unknown) => this.panel.tell(`Sound: ${messageOf(error)}`, true));
@@ -408,8 +420,8 @@ export class App implements PanelActions {
     this.panel.showSettings(this.settings);
   }
 
-  private showFigures(): void {
-    this.sinceShown = 0;
+  private showFigures(now: number): void {
+    this.shown = now;
     this.panel.showGait(this.walk.gait());
     this.panel.showRates(this.controlRate.perSecond, this.pictureRate.perSecond);
   }

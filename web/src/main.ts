@@ -51,6 +51,7 @@ async function begin(): Promise<void> {
   if (faults.length) app.tellFaults(faults);
   else shown?.tell(welcome(page));
   app.run();
+  performance.mark("interactive");
   const policyOf = async () => new Policy(file, robot);
   globalThis.mute = {
     app,

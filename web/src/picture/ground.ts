@@ -3,13 +3,15 @@
 import {
   BoxGeometry,
   CanvasTexture,
+  CircleGeometry,
   Color,
   EdgesGeometry,
   Group,
   LineBasicMaterial,
   LineSegments,
   Mesh,
-  MeshPhongMaterial,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
   PlaneGeometry,
   RepeatWrapping,
   SRGBColorSpace,
@@ -22,22 +24,23 @@ const TILE = 0.5;
 const EXTENT = 80;
 
 export class GroundPicture extends Group {
-  private readonly floor: Mesh<PlaneGeometry, MeshPhongMaterial>;
+  private readonly floor: Mesh<PlaneGeometry, MeshLambertMaterial | MeshBasicMaterial>;
   private readonly boxes = new Group();
-  private readonly stone = new MeshPhongMaterial({ specular: 0x111111 });
+  private readonly stone = new MeshLambertMaterial();
   private readonly edges = new LineBasicMaterial({ transparent: true, opacity: 0.35 });
   private drawn = "";
 
-  constructor() {
+  /** @param plain Whether to do without light, for machines to which that is too much. */
+  constructor(plain: boolean) {
     super();
     const texture = new CanvasTexture(tiles());
     texture.wrapS = texture.wrapT = RepeatWrapping;
     texture.repeat.set(EXTENT / (2 * TILE), EXTENT / (2 * TILE));
     texture.colorSpace = SRGBColorSpace;
-    texture.anisotropy = 8;
+    texture.anisotropy = plain ? 1 : 8;
     this.floor = new Mesh(
       new PlaneGeometry(EXTENT, EXTENT),
-      new MeshPhongMaterial({ map: texture, specular: 0x111111 }),
+      plain ? new MeshBasicMaterial({ map: texture }) : new MeshLambertMaterial({ map: texture }),
     );
     this.floor.receiveShadow = true;
     this.add(this.floor, this.boxes);
@@ -76,6 +79,16 @@ export class GroundPicture extends Group {
       for (const line of box.children) (line as LineSegments).geometry.dispose();
     }
     this.boxes.clear();
+  }
+}
+
+/** A dark spot below the robot, in place of a shadow, for machines to which shadows are too much. */
+export class ShadowSpot extends Mesh {
+  constructor() {
+    super(
+      new CircleGeometry(0.3, 24).scale(1, 0.75, 1),
+      new MeshBasicMaterial({ color: 0x000000, transparent: true, opacity: 0.16, depthWrite: false }),
+    );
   }
 }
 

@@ -20,8 +20,8 @@ import {
 
 import { compile, type MainModule } from "../physics/mujoco.js";
 import type { Simulation } from "../physics/simulation.js";
-import { GroundPicture } from "./ground.js";
-import { PixelBudget } from "./pixel_budget.js";
+import { GroundPicture, ShadowSpot } from "./ground.js";
+import { drawsInSoftware, PixelBudget } from "./pixel_budget.js";
 import { buildRobot } from "./robot.js";
 
 const TRUNK = 1;
@@ -30,10 +30,11 @@ export class Picture {
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly camera = new PerspectiveCamera(40, 1, 0.05, 100);
-  private readonly ground = new GroundPicture();
+  private readonly ground: GroundPicture;
+  private readonly spot = new ShadowSpot();
   private readonly sun = new DirectionalLight(0xffffff, 2.2);
   private readonly robot;
-  private readonly budget = new PixelBudget();
+  private readonly budget: PixelBudget;
   private readonly poses: [Pose, Pose];
   /** Where the camera looks from, beside the robot: rad, rad and m. */
   private readonly view = { azimuth: -0.9, elevation: 0.3, distance: 1.9 };
@@ -51,11 +52,17 @@ export class Picture {
     mujoco: MainModule,
     mjcf: string,
   ) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
-    this.renderer.shadowMap.enabled = true;
+    const software = drawsInSoftware();
+    this.budget = new PixelBudget(software);
+    this.ground = new GroundPicture(software);
+    this.renderer = new WebGLRenderer({
+      canvas,
+      antialias: !software,
+      powerPreference: "high-performance",
+    });
     this.renderer.shadowMap.type = PCFShadowMap;
     const model = compile(mujoco, mjcf, true);
-    this.robot = buildRobot(mujoco, model);
+    this.robot = buildRobot(mujoco, model, software ? 10 : 24);
     const bodies = model.nbody as number;
     model.delete();
     this.poses = [new Pose(bodies), new Pose(bodies)];
@@ -69,6 +76,11 @@ export class Picture {
   keep(simulation: Simulation): void {
     this.poses.reverse();
     this.poses[1].read(simulation);
+  }
+
+  /** Takes note of a pause. */
+  forget(): void {
+    this.budget.forget();
   }
 
   /** The same where the robot begins anew: there is nothing between. */
@@ -99,6 +111,7 @@ export class Picture {
     const trunk = this.robot.children[TRUNK].position;
     this.ground.follow(trunk.x, trunk.y, simulation.flights);
     this.target.lerp(trunk, Math.min(1, 6 * seconds));
+    this.spot.position.set(trunk.x, trunk.y, simulation.groundHeight(trunk.x) + 0.004);
     this.sun.position.copy(trunk).add(new Vector3(1.2, -1.6, 4));
     this.sun.target.position.copy(trunk);
     this.placeCamera();
@@ -116,13 +129,12 @@ export class Picture {
     this.scene.background = sky;
     this.scene.fog = new Fog(sky, 8, 28);
     const { shadow } = this.sun;
-    this.sun.castShadow = true;
     shadow.mapSize.set(1024, 1024);
     Object.assign(shadow.camera, { left: -1, right: 1, top: 1, bottom: -1, near: 1, far: 8 });
     shadow.bias = -0.0005;
     const hemisphere = new HemisphereLight(0xffffff, 0x8a8378, 1.1);
     hemisphere.position.set(0, 0, 1);
-    this.scene.add(this.ground, this.robot, this.sun, this.sun.target, hemisphere);
+    this.scene.add(this.ground, this.robot, this.spot, this.sun, this.sun.target, hemisphere);
     this.scene.add(new AmbientLight(0xffffff, 0.35));
     this.camera.up.set(0, 0, 1);
   }
@@ -143,6 +155,8 @@ export class Picture {
     if (!width || !height) return;
     this.size = { width, height };
     this.renderer.setPixelRatio(this.budget.ratio(window.devicePixelRatio));
+    this.renderer.shadowMap.enabled = this.sun.castShadow = this.budget.shadows;
+    this.spot.visible = !this.budget.shadows;
     this.renderer.setSize(this.size.width, this.size.height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();

@@ -22,21 +22,25 @@ import type { MainModule, MjModel } from "../physics/mujoco.js";
 const VISUAL = 2;
 const QUARTER_TURN = 0.5 * Math.PI;
 
-/** Makes a group whose children are the bodies, in the order of the model. */
-export function buildRobot(mujoco: MainModule, model: MjModel): Group {
+/**
+ * Makes a group whose children are the bodies, in the order of the model.
+ *
+ * @param detail Sides of what is round, from 8 on.
+ */
+export function buildRobot(mujoco: MainModule, model: MjModel, detail: number): Group {
   const robot = new Group();
-  for (let body = 0; body < model.nbody; body++) robot.add(buildBody(mujoco, model, body));
+  for (let body = 0; body < model.nbody; body++) robot.add(buildBody(mujoco, model, body, detail));
   return robot;
 }
 
-function buildBody(mujoco: MainModule, model: MjModel, body: number): Group {
+function buildBody(mujoco: MainModule, model: MjModel, body: number, detail: number): Group {
   const byMaterial = new Map<number, BufferGeometry[]>();
   for (let geom = 0; geom < model.ngeom; geom++) {
     if (model.geom_bodyid[geom] !== body || model.geom_group[geom] !== VISUAL) continue;
     const material = model.geom_matid[geom] as number;
     const shapes = byMaterial.get(material) ?? [];
     byMaterial.set(material, shapes);
-    shapes.push(shapeOf(mujoco, model, geom));
+    shapes.push(shapeOf(mujoco, model, geom, detail));
   }
   const group = new Group();
   for (const [material, shapes] of byMaterial) {
@@ -48,19 +52,24 @@ function buildBody(mujoco: MainModule, model: MjModel, body: number): Group {
   return group;
 }
 
-function shapeOf(mujoco: MainModule, model: MjModel, geom: number): BufferGeometry {
+function shapeOf(
+  mujoco: MainModule,
+  model: MjModel,
+  geom: number,
+  detail: number,
+): BufferGeometry {
   const [a, b, c] = model.geom_size.subarray(3 * geom, 3 * geom + 3) as Float64Array;
   const kind = mujoco.mjtGeom;
   let shape: BufferGeometry;
   switch (model.geom_type[geom]) {
     case kind.mjGEOM_SPHERE.value:
-      shape = new SphereGeometry(a, 20, 14);
+      shape = new SphereGeometry(a, detail, detail >> 1);
       break;
     case kind.mjGEOM_CAPSULE.value:
-      shape = new CapsuleGeometry(a, 2 * b, 6, 14).rotateX(QUARTER_TURN);
+      shape = new CapsuleGeometry(a, 2 * b, detail >> 2, detail).rotateX(QUARTER_TURN);
       break;
     case kind.mjGEOM_CYLINDER.value:
-      shape = new CylinderGeometry(a, a, 2 * b, 24).rotateX(QUARTER_TURN);
+      shape = new CylinderGeometry(a, a, 2 * b, detail).rotateX(QUARTER_TURN);
       break;
     case kind.mjGEOM_BOX.value:
       shape = new BoxGeometry(2 * a, 2 * b, 2 * c);
