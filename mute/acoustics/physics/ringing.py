@@ -51,7 +51,7 @@ def band_edges(middle: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArra
 
 @dataclass(frozen=True)
 class Tones:
-    """The modes of a third octave that are heard, each exp(-ln(10^3) t / decay) sin(w t + phase)."""
+    """The modes of a third octave that are heard, exp(-ln(10^3) t / decay) sin(w t + phase)."""
 
     band: int
     """Index into `BANDS`."""
@@ -93,9 +93,16 @@ def ringing_tones(
 
 
 def ringing_energy(plate: Plate, band: int) -> float:
-    """Return the energy that a blow of 1 N s is to radiate in a third octave, times rho c, Pa^2 m^2 s.
+    """Return the energy that a blow of 1 N s is to radiate in a third octave, times rho c.
 
     A force of 1 N s has 2 df of F^2 in a band; the plate radiates `Plate.ringing_power` of that.
+
+    Args:
+        plate: The plate.
+        band: Index into `BANDS`.
+
+    Returns:
+        Pa^2 m^2 s.
     """
     low, high = band_edges(BANDS)
     wanted = 2.0 * (high[band] - low[band]) * AIR_IMPEDANCE

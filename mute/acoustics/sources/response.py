@@ -42,7 +42,7 @@ def audible_end(impulses: NDArray, gone: float = 1e-8) -> int:
 
 
 def modes_seed(plate: Plate) -> int:
-    """Return what the modes of a plate are drawn with, so that the same plate is always the same."""
+    """Return the seed of a plate's modes: the same plate is always the same."""
     return round(1e6 * (plate.surface_mass + plate.critical_frequency))
 
 
