@@ -18,7 +18,6 @@ from mute.acoustics.floors import FLOORS
 from mute.controllers.command import COMMAND_LIMITS, Command
 from mute.controllers.learned import Policy
 from mute.controllers.onnx_export import export_policy
-from mute.envs.footfall import FootfallCfg
 from mute.envs.quadruped_env import scene_of
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.scene import FOOT_RADIUS, JOINT_NAMES, LEGS, SceneCfg

@@ -78,6 +78,7 @@ class OnnxController:
         metadata = self._session.get_modelmeta().custom_metadata_map
         self._recurrent: dict[str, str] = json.loads(metadata["recurrent_state"])
         self._shapes = {node.name: node.shape for node in self._session.get_inputs()}
+        self.num_envs = 1
         self.reset()
 
     def reset(self, mask: torch.Tensor | None = None) -> None:

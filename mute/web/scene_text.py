@@ -79,7 +79,17 @@ def _differs(one: object, other: object, name: str) -> bool:
     return isinstance(b, int | float) and name not in _SIZES and a != b
 
 
-_SIZES = {"nbuffer", "nnames", "nnames_map", "ntex", "ntexdata", "nmat", "npaths", "narena", "nlight"}
+_SIZES = {
+    "nbuffer",
+    "nnames",
+    "nnames_map",
+    "ntex",
+    "ntexdata",
+    "nmat",
+    "npaths",
+    "narena",
+    "nlight",
+}
 """Sizes of memory, and of what is only seen."""
 
 

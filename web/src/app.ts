@@ -88,6 +88,7 @@ export class App implements PanelActions {
     this.listen();
     this.show();
     parts.picture?.paint(simulation.floor.colour);
+    parts.picture?.lookAhead(simulation);
     parts.picture?.jump(simulation);
   }
 
@@ -176,6 +177,7 @@ export class App implements PanelActions {
     const [ground, level = "0"] = choice.split(" ");
     this.parts.simulation.setGround(ground as Ground, Number(level));
     this.keep({ ground: ground as Ground, level: Number(level) });
+    this.parts.picture?.lookAhead(this.parts.simulation);
     this.begin();
     const stairs = "The policy that ships has learnt on flat floors alone: it may stumble and fall.";
     this.panel.tell(ground === "flat" ? "The ground is flat." : stairs);

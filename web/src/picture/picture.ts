@@ -26,6 +26,9 @@ import { buildRobot } from "./robot.js";
 
 const TRUNK = 1;
 
+/** Azimuth of the camera, rad. */
+const FROM_THE_FRONT = -0.9;
+
 export class Picture {
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
@@ -37,7 +40,7 @@ export class Picture {
   private readonly budget: PixelBudget;
   private readonly poses: [Pose, Pose];
   /** Where the camera looks from, beside the robot: rad, rad and m. */
-  private readonly view = { azimuth: -0.9, elevation: 0.3, distance: 1.9 };
+  private readonly view = { azimuth: FROM_THE_FRONT, elevation: 0.3, distance: 1.9 };
   private readonly target = new Vector3(0, 0, 0.25);
   private size = { width: 1, height: 1 };
 
@@ -87,6 +90,11 @@ export class Picture {
   jump(simulation: Simulation): void {
     for (const pose of this.poses) pose.read(simulation);
     this.target.copy(this.poses[1].position(TRUNK));
+  }
+
+  /** Looks from where one sees what lies ahead: on stairs from behind, else from the front. */
+  lookAhead(simulation: Simulation): void {
+    this.view.azimuth = simulation.flights ? -2.3 : FROM_THE_FRONT;
   }
 
   /** Draws with another floor's colour from now on. */
