@@ -7,7 +7,6 @@ feet, elliptic cones, so that there is one physics for eye and ear. The policy i
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
 from pathlib import Path
@@ -60,9 +59,8 @@ def write_assets(policy: Policy, out: Path) -> list[Path]:
         "stairs.xml": scene_text(_with_boxes(scene_of(cfg))).encode(),
         "page.json": _json(page_data(policy, cfg)),
     }
-    with contextlib.suppress(NotImplementedError):
-        sound_json, sound_binary = packed(sound_tables())
-        written |= {"sound.json": sound_json.encode(), "sound.bin": sound_binary}
+    sound_json, sound_binary = packed(sound_tables())
+    written |= {"sound.json": sound_json.encode(), "sound.bin": sound_binary}
     for name, data in written.items():
         write_file(out / name, data)
     return [policy_file, *(out / name for name in written)]

@@ -8,7 +8,7 @@ import { Simulation } from "./physics/simulation.js";
 import { Picture } from "./picture/picture.js";
 import { Policy } from "./policy/policy.js";
 import { fromAddress } from "./settings/settings.js";
-import { hearingStarter, soundFiles } from "./sound_files.js";
+import { hearingStarter, MeasuredSound, soundFiles } from "./sound_files.js";
 import { anyElement, canvas } from "./ui/elements.js";
 import { Panel } from "./ui/panel.js";
 
@@ -52,11 +52,14 @@ async function begin(): Promise<void> {
   else shown?.tell(welcome(page));
   app.run();
   performance.mark("interactive");
-  const policyOf = async () => new Policy(file, robot);
   globalThis.mute = {
     app,
-    measure: async (walk) =>
-      measure(new Simulation(mujoco, scenes, page), await policyOf(), page, await sound(), walk),
+    measure: async (walk) => {
+      const tables = await sound();
+      const own = new Simulation(mujoco, scenes, page);
+      const hear = (surface: string) => new MeasuredSound(tables, surface, own.timestep);
+      return measure(own, new Policy(file, robot), page, hear, walk);
+    },
   };
 }
 

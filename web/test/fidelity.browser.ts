@@ -26,7 +26,6 @@ for (const name of ["loud", "quiet", "turning"]) {
       const off = Math.abs(measured.gait[figure] / reference.gait[figure] - 1);
       assert.ok(off < 0.03, `${figure} is ${measured.gait[figure]}, in Python ${reference.gait[figure]}`);
     }
-    if (measured.mnl === null || measured.pnl === null) assert.fail("the page has no sound");
     console.log(`${name}: MNL ${measured.mnl} dBA, in Python ${reference.mnl}`);
     assert.ok(Math.abs(measured.mnl - reference.mnl) < 0.5, `MNL is ${measured.mnl} dBA`);
     assert.ok(Math.abs(measured.pnl - reference.pnl) < 1, `PNL is ${measured.pnl} dBA`);

@@ -21,9 +21,9 @@ export interface MeasuredWalk {
 /** What it was like. */
 export interface Measured {
   readonly gait: Gait;
-  /** Mean and peak noise level, dBA; null where there are no tables of sound. */
-  readonly mnl: number | null;
-  readonly pnl: number | null;
+  /** Mean and peak noise level, dBA. */
+  readonly mnl: number;
+  readonly pnl: number;
   /** Generalised positions at the end. */
   readonly qpos: readonly number[];
 }
@@ -41,14 +41,14 @@ export interface OfflineHearing {
  * @param simulation A robot of the measurement's own, which is deleted afterwards.
  * @param policy What drives it, likewise its own.
  * @param page Limits and times.
- * @param hear Makes what hears it, on a floor; null where there are no tables of sound.
+ * @param hear Makes what hears it, on a floor.
  * @param walk What is walked.
  */
 export function measure(
   simulation: Simulation,
   policy: Policy,
   page: PageData,
-  hear: ((surface: string) => OfflineHearing) | null,
+  hear: (surface: string) => OfflineHearing,
   walk: MeasuredWalk,
 ): Measured {
   simulation.setFloor(walk.surface);
@@ -56,14 +56,14 @@ export function measure(
   const robot = new Walk(simulation, policy, page, walk.command);
   if (walk.first_state) robot.restartFrom(walk.first_state.qpos, walk.first_state.qvel);
   const batcher = new ReadingsBatcher(simulation, policy.decimation);
-  const hearing = hear?.(walk.surface) ?? null;
+  const hearing = hear(walk.surface);
   const steps = Math.round(walk.seconds / robot.stepTime);
   for (let step = 0; step < steps; step++) {
-    const outcome = robot.step(hearing ? batcher.listen : undefined);
-    hearing?.feed(batcher.take());
+    const outcome = robot.step(batcher.listen);
+    hearing.feed(batcher.take());
     if (outcome !== "walking") batcher.restart(simulation);
   }
   const qpos = Array.from(simulation.qpos);
   simulation.delete();
-  return { gait: robot.gait(), mnl: hearing?.mnl ?? null, pnl: hearing?.pnl ?? null, qpos };
+  return { gait: robot.gait(), mnl: hearing.mnl, pnl: hearing.pnl, qpos };
 }
