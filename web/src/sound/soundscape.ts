@@ -77,6 +77,11 @@ export class Soundscape {
     return this.count;
   }
 
+  /** Most steps that can wait. */
+  get room(): number {
+    return this.capacity;
+  }
+
   /** Takes the next physics step, to be heard after those before; of too many the oldest goes. */
   step(readings: ContactReadings): void {
     if (this.count === this.capacity) this.skip(1);
@@ -112,6 +117,11 @@ export class Soundscape {
     }
     if (made < out.length) this.seam.fade(out, made);
     return made;
+  }
+
+  /** Gives silence while steps wait, to which what was heard fades. */
+  pause(out: Float32Array): void {
+    this.seam.fade(out, 0);
   }
 
   /** Sets the floor, from the next step on; what was struck rings out. */

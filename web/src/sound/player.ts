@@ -1,0 +1,105 @@
+/** The page's end of the sound: starts the audio thread, and gives it what the physics tells. */
+
+import {
+  type FromProcessor,
+  type Levels,
+  PROCESSOR,
+  type ProcessorOptions,
+  type ToProcessor,
+} from "./messages.js";
+import type { SoundscapeOptions } from "./options.js";
+import type { SoundTables } from "./tables.js";
+
+/** Time in which the volume changes, s: at once would click. */
+const VOLUME_TIME = 0.02;
+
+/** Plays batches of readings as they come. Made by `startPlayer`. */
+export class Player {
+  /** Is told the levels, twenty times a second while there is sound. */
+  onLevels: ((levels: Levels) => void) | null = null;
+
+  constructor(
+    private readonly context: AudioContext,
+    private readonly node: AudioWorkletNode,
+    private readonly volume: GainNode,
+  ) {
+    node.port.onmessage = (event: MessageEvent<FromProcessor>) => this.onLevels?.(event.data);
+  }
+
+  /** Takes physics steps in the order of time; the array is given away where it can be. */
+  feed(batch: Float32Array): void {
+    const whole = batch.byteLength === batch.buffer.byteLength;
+    // A part of an array would drag all of it along, or take it away from others.
+    const own = whole ? batch : batch.slice();
+    this.node.port.postMessage({ kind: "readings", batch: own } satisfies ToProcessor, [own.buffer]);
+  }
+
+  setSurface(name: string): void {
+    this.node.port.postMessage({ kind: "surface", name } satisfies ToProcessor);
+  }
+
+  /** The walk begins anew, and so do its figures. */
+  reset(): void {
+    this.node.port.postMessage({ kind: "reset" } satisfies ToProcessor);
+  }
+
+  /** Sets the volume: 1 plays a sound pressure of 2 Pa as loud as can be. Levels do not change. */
+  setVolume(gain: number): void {
+    this.volume.gain.setTargetAtTime(gain, this.context.currentTime, VOLUME_TIME);
+  }
+
+  /** Stops, where it is; time stands still for what is heard. */
+  suspend(): Promise<void> {
+    return this.context.suspend();
+  }
+
+  /** Goes on from there. */
+  resume(): Promise<void> {
+    return this.context.resume();
+  }
+
+  /** Ends for good. */
+  async close(): Promise<void> {
+    this.node.port.onmessage = null;
+    this.node.disconnect();
+    await this.context.close();
+  }
+}
+
+/**
+ * Starts the sound; to be called in a gesture, as browsers demand.
+ *
+ * @param tables What Python worked out.
+ * @param worklet Address of the bundled `worklet.ts`.
+ * @param options Floor and more.
+ * @throws Error that says in a line what is missing.
+ */
+export async function startPlayer(
+  tables: SoundTables,
+  worklet: string,
+  options: SoundscapeOptions,
+): Promise<Player> {
+  if (typeof AudioContext !== "function") {
+    throw new Error("this browser has no Web Audio");
+  }
+  const context = new AudioContext({ sampleRate: tables.sample_rate, latencyHint: "interactive" });
+  try {
+    if (!("audioWorklet" in context)) {
+      throw new Error("this browser has no audio worklets here; they need https or localhost");
+    }
+    await context.audioWorklet.addModule(worklet);
+    const processorOptions: ProcessorOptions = { tables, soundscape: options };
+    const node = new AudioWorkletNode(context, PROCESSOR, {
+      numberOfInputs: 0,
+      outputChannelCount: [2],
+      processorOptions,
+    });
+    const volume = new GainNode(context);
+    node.connect(volume).connect(context.destination);
+    await context.resume();
+    return new Player(context, node, volume);
+  } catch (error) {
+    await context.close();
+    throw error;
+  }
+}
