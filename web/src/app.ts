@@ -35,6 +35,8 @@ export interface Parts {
 /** Speed that a push adds to the trunk, to one side and the other in turn, m/s. */
 const PUSH = 1;
 
+const SILENCE: Levels = { level: NaN, mnl: NaN, pnl: NaN, seconds: 0, waiting: 0 };
+
 /** Times a second that figures are shown. */
 const SHOWN = 4;
 
@@ -54,7 +56,7 @@ export class App implements PanelActions {
   private batcher: ReadingsBatcher;
   private hearing: Hearing | null = null;
   private isHearing = false;
-  private levels: Levels = { level: NaN, mnl: NaN, pnl: NaN, seconds: 0 };
+  private levels = SILENCE;
   private settings: Settings;
   private pushes = 0;
   private shown = 0;
@@ -249,7 +251,7 @@ export class App implements PanelActions {
     this.walk.restart();
     this.batcher.restart(simulation);
     this.hearing?.reset();
-    this.levels = { level: NaN, mnl: NaN, pnl: NaN, seconds: 0 };
+    this.levels = SILENCE;
     picture?.jump(simulation);
   }
 
@@ -384,7 +386,7 @@ export class App implements PanelActions {
     );
     document.addEventListener("visibilitychange", () => this.pauseOrGoOn());
     window.addEventListener("hashchange", () => this.takeAddress());
-    if (!this.parts.startHearing) this.panel.showSound(null);
+    this.panel.showSound(this.parts.startHearing ? false : null);
   }
 
   /** A hidden tab pauses the robot and its sound; both go on where they were. */

@@ -1,20 +1,36 @@
 /** Begins the page: loads what it needs at once, and says plainly what is missing. */
 
 import { App } from "./app.js";
-import { measure, type Measured, type MeasuredWalk } from "./control/measure.js";
+import {
+  KeptReadings,
+  measure,
+  type Measured,
+  type MeasuredWalk,
+  type OfflineHearing,
+} from "./control/measure.js";
+import { levelsOf, renderSound } from "./control/rendered_sound.js";
 import { loadPhysics } from "./physics/mujoco.js";
 import { type PageData, readPageData } from "./physics/page_data.js";
 import { Simulation } from "./physics/simulation.js";
 import { Picture } from "./picture/picture.js";
 import { Policy } from "./policy/policy.js";
 import { fromAddress } from "./settings/settings.js";
-import { hearingStarter, MeasuredSound, soundFiles } from "./sound_files.js";
+import { OfflineSound } from "./sound/offline.js";
+import { hearingStarter, soundFiles, WORKLET } from "./sound_files.js";
 import { anyElement, canvas } from "./ui/elements.js";
 import { Panel } from "./ui/panel.js";
 
 declare global {
   /** For the console of the browser, and for tests. */
-  var mute: { app: App; measure(walk: MeasuredWalk): Promise<Measured> } | undefined;
+  var mute:
+    | {
+        app: App;
+        /** Walks as fast as the machine can, and measures walk and sound. */
+        measure(walk: MeasuredWalk): Promise<Measured>;
+        /** The same, the sound measured in the samples of the worklet. */
+        measureWorklet(walk: MeasuredWalk): Promise<Measured>;
+      }
+    | undefined;
 }
 
 async function begin(): Promise<void> {
@@ -36,6 +52,7 @@ async function begin(): Promise<void> {
   const simulation = new Simulation(mujoco, scenes, page);
   const robot = { jointNames: page.joint_names, timestep: simulation.timestep };
   const [picture, why] = makePicture(() => new Picture(canvas("view"), mujoco, flat));
+  const startHearing = hearingStarter(sound, simulation.timestep);
   let shown: Panel | undefined;
   const app = new App({
     page,
@@ -45,23 +62,33 @@ async function begin(): Promise<void> {
     settings,
     picture,
     panel: (actions) => (shown = new Panel(page, actions)),
-    startHearing: hearingStarter(sound),
+    startHearing,
   });
   shown?.ready(why);
   if (faults.length) app.tellFaults(faults);
-  else shown?.tell(welcome(page));
+  else shown?.tell(startHearing ? welcome(page) : NO_SOUND);
   app.run();
   performance.mark("interactive");
+  const walkAndHear = (walk: MeasuredWalk, hear: (surface: string) => OfflineHearing) =>
+    measure(new Simulation(mujoco, scenes, page), new Policy(file, robot), page, hear, walk);
+  const { timestep } = simulation;
   globalThis.mute = {
     app,
     measure: async (walk) => {
       const tables = await sound();
-      const own = new Simulation(mujoco, scenes, page);
-      const hear = (surface: string) => new MeasuredSound(tables, surface, own.timestep);
-      return measure(own, new Policy(file, robot), page, hear, walk);
+      return walkAndHear(walk, (surface) => new OfflineSound(tables, { surface, timestep }));
+    },
+    measureWorklet: async (walk) => {
+      const [tables, kept] = [await sound(), new KeptReadings()];
+      const measured = walkAndHear(walk, () => kept);
+      const samples = await renderSound(tables, WORKLET, walk.surface, timestep, kept.all);
+      return { ...measured, ...levelsOf(samples, tables) };
     },
   };
 }
+
+const NO_SOUND =
+  "There is no sound in this browser, or not here: audio worklets need https or localhost.";
 
 function welcome(page: PageData): string {
   return `It walks on ${page.surface}. Turn β, drive with the keys, and switch the sound on.`;

@@ -34,6 +34,21 @@ for (const name of ["loud", "quiet", "turning"]) {
   });
 }
 
+// Less by what is clipped: the worklet plays up to 2 Pa, and feet on boards make more.
+test("the worklet's own samples have Python's level", async () => {
+  const { page, errors } = await site.visit();
+  const { command, surface, terrain, level, first_state, mnl, pnl } = walks.loud;
+  page.setDefaultTimeout(LONG.timeout);
+  const measured = await page.evaluate((walk) => globalThis.mute!.measureWorklet(walk), {
+    command, seconds: 20, surface, terrain, level, first_state,
+  });
+  console.log(`worklet: MNL ${measured.mnl} dBA, PNL ${measured.pnl}, in Python ${mnl} and ${pnl}`);
+  assert.ok(Math.abs(measured.mnl - mnl) < 0.5, `MNL is ${measured.mnl} dBA`);
+  assert.ok(Math.abs(measured.pnl - pnl) < 1, `PNL is ${measured.pnl} dBA`);
+  assert.deepEqual(errors, []);
+  await page.context().close();
+});
+
 test("control keeps 50 Hz, and pictures come", async () => {
   const { page } = await site.visit();
   const begun = await page.evaluate(() => performance.getEntriesByName("interactive")[0].startTime);

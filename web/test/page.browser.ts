@@ -256,6 +256,87 @@ test("a joystick drives a touch screen that is 360 px wide, where nothing overfl
   await leave(opened);
 });
 
+/** Waits until the meter shows a mean level, and returns all. */
+async function levelsOf(page: Page) {
+  await page.waitForFunction(() => globalThis.mute!.app.state.levels.mnl > 0, null, LONG);
+  return page.evaluate(() => globalThis.mute!.app.state.levels);
+}
+
+test("a tap switches sound on, the meter shows its levels, and they begin anew with the walk", async () => {
+  const opened = await site.visit({ hash: "#beta=0" });
+  const { page } = opened;
+  assert.equal(await page.textContent("#mnl"), "–");
+  await page.click("#sound");
+  await page.waitForSelector("#sound[aria-pressed=true]");
+  const { level, mnl, pnl } = await levelsOf(page);
+  for (const value of [level, mnl, pnl]) assert.ok(value > 55 && value < 85, `it shows ${value} dBA`);
+  await page.waitForFunction(() => /^\d\d\.\d$/.test(document.getElementById("mnl")!.textContent!));
+  await until(page, (mute) => mute!.app.state.levels.seconds > 3);
+  await opened.picture("sound");
+  await page.selectOption("#floor", "carpet");
+  await page.click("#restart");
+  assert.ok(Number.isNaN(await page.evaluate(() => globalThis.mute!.app.state.levels.mnl)));
+  const onCarpet = await levelsOf(page);
+  assert.ok(onCarpet.mnl < mnl - 1, `carpet has ${onCarpet.mnl} dBA, wood ${mnl}`);
+  await page.click("#sound");
+  await page.waitForSelector("#sound[aria-pressed=false]");
+  await leave(opened);
+});
+
+test("a button compares ten seconds at beta 0 and at beta 1, and puts beta back", async () => {
+  const opened = await site.visit({ hash: "#beta=0.3" });
+  const { page } = opened;
+  await page.click("#compare");
+  await page.waitForFunction(
+    () => /dB quieter at β 1/.test(document.getElementById("comparison")!.textContent!),
+    null,
+    LONG,
+  );
+  const told = (await page.textContent("#comparison")) ?? "";
+  const [loud, quiet] = [...told.matchAll(/: ([\d.]+) dBA/g)].map(([, value]) => Number(value));
+  assert.ok(Math.abs(loud - 67.4) < 1.5 && Math.abs(quiet - 63.3) < 1.5, told);
+  assert.equal((await stateOf(page)).command.beta, 0.3);
+  await opened.picture("compared");
+  await page.click("#compare");
+  await page.waitForFunction(() => /to go/.test(document.getElementById("comparison")!.textContent!));
+  await page.fill("#vx", "0.2");
+  assert.match((await page.textContent("#comparison")) ?? "", /was stopped/);
+  await leave(opened);
+});
+
+test("sound pauses with a hidden tab, and goes on", async () => {
+  const opened = await site.visit();
+  const { page } = opened;
+  await page.click("#sound");
+  await levelsOf(page);
+  const hide = (hidden: boolean) =>
+    page.evaluate((value) => {
+      Object.defineProperty(document, "hidden", { configurable: true, get: () => value });
+      document.dispatchEvent(new Event("visibilitychange"));
+    }, hidden);
+  await hide(true);
+  await page.waitForTimeout(300);
+  const before = await page.evaluate(() => globalThis.mute!.app.state.levels.seconds);
+  await page.waitForTimeout(1500);
+  await hide(false);
+  const after = await page.evaluate(() => globalThis.mute!.app.state.levels.seconds);
+  assert.ok(after - before < 0.2, `it heard ${after - before} s while it was hidden`);
+  await until(page, (mute) => mute!.app.state.levels.seconds > 2);
+  await leave(opened);
+});
+
+test("a browser without audio worklets is told so, and the robot walks on", async () => {
+  const opened = await site.visit({
+    before: () => Reflect.deleteProperty(globalThis, "AudioWorkletNode"),
+  });
+  const { page } = opened;
+  assert.equal(await page.textContent("#sound"), "No sound here");
+  assert.ok(await page.isDisabled("#sound"));
+  assert.ok(await page.isDisabled("#compare"));
+  assert.match(await opened.note(), /no sound/i);
+  await leave(opened);
+});
+
 test("a hidden tab pauses, and goes on without a jump", async () => {
   const opened = await site.visit();
   const { page } = opened;

@@ -10,8 +10,8 @@ export interface Compared {
   end(): void;
 }
 
-/** Time that is walked before it is measured, s: the robot has to get going. */
-const SETTLE = 1;
+/** Time that is walked before it is measured, s: the robot and the meter have to get going. */
+const SETTLE = 1.5;
 /** Time that is measured, s. */
 const MEASURED = 10;
 
@@ -48,8 +48,9 @@ export class Comparison {
    */
   follow(seconds: number, mnl: number): void {
     if (!this.isRunning) return;
-    if (seconds < SETTLE + MEASURED) {
-      const left = Math.ceil(SETTLE + MEASURED - seconds);
+    // Of a walk that is hardly heard there is no level yet.
+    if (seconds < SETTLE + MEASURED || Number.isNaN(mnl)) {
+      const left = Math.max(Math.ceil(SETTLE + MEASURED - seconds), 0);
       this.page.tell(`β ${BETAS[this.index]}: ${left} s to go. ${this.soFar()}`.trim(), true);
       return;
     }

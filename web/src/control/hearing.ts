@@ -14,6 +14,8 @@ export interface Levels {
   readonly pnl: number;
   /** Time that both are over, s. */
   readonly seconds: number;
+  /** Time that waits to be heard, s. */
+  readonly waiting: number;
 }
 
 /** Makes sound of batches, and measures it. */

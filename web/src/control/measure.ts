@@ -35,6 +35,28 @@ export interface OfflineHearing {
   readonly pnl: number;
 }
 
+/** Keeps what there is to be heard of a walk. */
+export class KeptReadings implements OfflineHearing {
+  readonly mnl = NaN;
+  readonly pnl = NaN;
+  private readonly batches: Float32Array[] = [];
+
+  feed(batch: Float32Array): void {
+    this.batches.push(batch);
+  }
+
+  /** All physics steps, one after the other. */
+  get all(): Float32Array {
+    const all = new Float32Array(this.batches.reduce((sum, { length }) => sum + length, 0));
+    let at = 0;
+    for (const batch of this.batches) {
+      all.set(batch, at);
+      at += batch.length;
+    }
+    return all;
+  }
+}
+
 /**
  * Walks and measures.
  *
