@@ -6,6 +6,12 @@ import type { SoundTables } from "./tables.js";
 /** Name that the audio thread's part is registered by. */
 export const PROCESSOR = "mute-sound";
 
+/**
+ * Sound pressure of a sample of 1, Pa, as in the WAV files of Python. Always the same, so that a quiet
+ * walk sounds quiet beside a loud one; a boarded floor under a foot has peaks of half of it.
+ */
+export const FULL_SCALE = 10;
+
 /** What the audio thread begins with. */
 export interface ProcessorOptions {
   readonly tables: SoundTables;

@@ -1,6 +1,7 @@
 /** The page's end of the sound: starts the audio thread, and gives it what the physics tells. */
 
 import {
+  FULL_SCALE,
   type FromProcessor,
   type Levels,
   PROCESSOR,
@@ -12,6 +13,15 @@ import type { SoundTables } from "./tables.js";
 
 /** Time in which the volume changes, s: at once would click. */
 const VOLUME_TIME = 0.02;
+
+/**
+ * Gain of the volume 1: a sound pressure of 1 Pa, 91 dB of a tone, is as loud as can be. Loudspeakers
+ * of small machines are too quiet for a walk at full scale.
+ */
+const LOUDNESS = FULL_SCALE / 1;
+
+/** Samples beyond full scale that can still be told apart, in full scales. */
+const BEYOND = 8;
 
 /** Plays batches of readings as they come. Made by `startPlayer`. */
 export class Player {
@@ -43,9 +53,9 @@ export class Player {
     this.node.port.postMessage({ kind: "reset" } satisfies ToProcessor);
   }
 
-  /** Sets the volume: 1 plays a sound pressure of 2 Pa as loud as can be. Levels do not change. */
+  /** Sets the volume, 1 unless told. Levels do not change with it. */
   setVolume(gain: number): void {
-    this.volume.gain.setTargetAtTime(gain, this.context.currentTime, VOLUME_TIME);
+    this.volume.gain.setTargetAtTime(LOUDNESS * gain, this.context.currentTime, VOLUME_TIME);
   }
 
   /** Stops, where it is; time stands still for what is heard. */
@@ -94,12 +104,30 @@ export async function startPlayer(
       outputChannelCount: [2],
       processorOptions,
     });
-    const volume = new GainNode(context);
-    node.connect(volume).connect(context.destination);
+    const volume = new GainNode(context, { gain: LOUDNESS });
+    limit(context, node.connect(volume)).connect(context.destination);
     await context.resume();
     return new Player(context, node, volume);
   } catch (error) {
     await context.close();
     throw error;
   }
+}
+
+/**
+ * Rounds off samples near and beyond full scale, and returns what comes of it: the blow on a boarded
+ * floor is several times what else there is, and low. Up to half of full scale nothing changes.
+ */
+function limit(context: AudioContext, sound: AudioNode): AudioNode {
+  const curve = new Float32Array(4097);
+  const middle = (curve.length - 1) / 2;
+  for (let i = 0; i < curve.length; i++) {
+    const sample = (BEYOND * (i - middle)) / middle;
+    const size = Math.abs(sample);
+    const heard = size < 0.5 ? size : 0.5 + 0.5 * Math.tanh(2 * size - 1);
+    curve[i] = Math.sign(sample) * heard;
+  }
+  // A curve reaches from -1 to 1: what comes is made smaller before.
+  const smaller = new GainNode(context, { gain: 1 / BEYOND });
+  return sound.connect(smaller).connect(new WaveShaperNode(context, { curve }));
 }

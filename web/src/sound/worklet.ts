@@ -1,6 +1,12 @@
 /** The audio thread's end of the sound. Bundled into a file of its own, which `Player` loads. */
 
-import { type FromProcessor, PROCESSOR, type ProcessorOptions, type ToProcessor } from "./messages.js";
+import {
+  FULL_SCALE,
+  type FromProcessor,
+  PROCESSOR,
+  type ProcessorOptions,
+  type ToProcessor,
+} from "./messages.js";
 import { Playback } from "./playback.js";
 
 declare class AudioWorkletProcessor {
@@ -11,9 +17,6 @@ declare function registerProcessor(
   processor: new (options: { processorOptions: ProcessorOptions }) => AudioWorkletProcessor,
 ): void;
 declare const sampleRate: number;
-
-/** Sound pressure of a full-scale sample, Pa. Always the same, so that quiet sounds quiet. */
-const FULL_SCALE = 2;
 
 /** How often levels are told, Hz. */
 const TOLD = 20;
@@ -43,7 +46,7 @@ class SoundProcessor extends AudioWorkletProcessor {
     if (channels === undefined || out === undefined) return true;
     this.playback.play(out);
     for (let i = 0; i < out.length; i++) {
-      out[i] = Math.max(-1, Math.min(1, (out[i] as number) / FULL_SCALE));
+      out[i] = (out[i] as number) / FULL_SCALE;
     }
     for (let channel = 1; channel < channels.length; channel++) channels[channel]?.set(out);
     this.silent += out.length;
