@@ -11,6 +11,7 @@ from mute.command_lines.policy_options import PolicyArgs, check_audible
 from mute.controllers import load_policy
 from mute.support.errors import MuteError
 from mute.web.assets import write_assets
+from mute.web.sound_references import write_sound_references
 
 __all__ = ["WebArgs", "main"]
 
@@ -24,6 +25,8 @@ class WebArgs(PolicyArgs):
     reference: Path | None = None
     """Walk in Python as well, and keep in this directory what the page's tests hold it to; needs
     the extra `onnx`."""
+    sound_reference: Path | None = None
+    """Walk on every floor as well, and keep in this directory what the page's sound is held to."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -46,6 +49,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         except ModuleNotFoundError as error:
             raise MuteError(f"--reference needs the package {error.name}") from error
         files += write_reference(policy, args.policy, args.reference)
+    if args.sound_reference is not None:
+        make_directory(args.sound_reference, "sound-reference")
+        files += write_sound_references(policy, args.policy, args.sound_reference)
     for file in files:
         print(f"wrote {file}")
     return 0

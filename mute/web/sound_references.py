@@ -1,13 +1,7 @@
 """What the page's sound is held to: recorded walks, and what Python makes of them.
 
-    python -m mute.web.sound_references --out web/test/sound/reference
-
-writes, of the policy that ships on each floor at beta 0 and 1:
-
-- `FLOOR-BETA.bin.gz`: a walk of some seconds, its readings in whole steps of `STEPS`;
-- `references.json`: what Python's soundscape makes of those very readings, in levels and third
-  octaves, by source and in all; the places that blows hit; what a meter reads of a known sound;
-- `sensors.bin.gz`: a part of a walk as the sensors have it, for who makes readings of them.
+The policy walks on each floor at beta 0 and 1. What it does is kept in whole steps, so that files
+are small, and what is heard is that of the very numbers that were kept.
 """
 
 from __future__ import annotations
@@ -15,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import gzip
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from mute.acoustics.audible_env import make_listening_env
+from mute.acoustics.audible_env import TIMESTEP, make_listening_env
 from mute.acoustics.contacts import ContactBlock, Impacts
 from mute.acoustics.metering.levels import P_REF
 from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
@@ -32,8 +25,6 @@ from mute.acoustics.metering.third_octaves import third_octaves
 from mute.acoustics.recorder import Recorder
 from mute.acoustics.soundscape import SOURCES, Soundscape
 from mute.acoustics.sources.landings import place_struck
-from mute.command_lines.arguments import command_line, make_directory, parse
-from mute.command_lines.sound_options import load_audible_policy, tell
 from mute.controllers import LearnedController
 from mute.controllers.command import Command
 from mute.controllers.learned import Policy
@@ -42,14 +33,12 @@ from mute.envs.scene import FOOT_RADIUS, LEGS
 from mute.envs.sensors import sensor_slice
 from mute.evaluation.session import Session
 from mute.evaluation.usual_robots import robots_cfg
-from mute.support.errors import MuteError, run_cli
+from mute.support.errors import MuteError
 from mute.support.files import write_file
 from mute.support.provenance import file_sha256
-from mute.support.resources import RESOURCES
-from mute.support.threads import use_collection_threads
 from mute.web.sound_tables import SAMPLE_RATE
 
-__all__ = ["STEPS", "ReferenceArgs", "main"]
+__all__ = ["STEPS", "write_sound_references"]
 
 STEPS = {
     "landing_speed": 1e-4,
@@ -73,6 +62,8 @@ _SURFACES = ("wood", "carpet", "tile", "concrete")
 _BETAS = (0.0, 1.0)
 _MORE = (("parquet", 0.0), ("laminate", 0.0))
 """Floors that are held to at one beta alone."""
+_SEED = 1
+"""Of the robots, each a little different from the exact model, and of their first states."""
 _SPEED = 0.5
 """Commanded forward speed, m/s."""
 _WARM_UP = 1.0
@@ -84,45 +75,39 @@ _SENSED = 400
 """Physics steps whose sensors are kept."""
 
 
-@dataclass
-class ReferenceArgs:
-    """Arguments of the program."""
+def write_sound_references(policy: Policy, policy_file: Path, out: Path) -> list[Path]:
+    """Walk, and write what was done and heard into a directory, which is made if need be.
 
-    policy: Path = RESOURCES / "go1" / "go1_mute.pt"
-    """Who walks: a checkpoint."""
-    out: Path = Path("web/test/sound/reference")
-    """Directory of the files that are written."""
-    seed: int = 1
-    """Of the robots, each a little different from the exact model, and of their first states."""
+    - `FLOOR-BETA.bin.gz`: a walk of some seconds, its readings in whole steps of `STEPS`;
+    - `references.json`: what Python's soundscape makes of those very readings, in levels and third
+      octaves, by source and in all; the places that blows hit; what a meter reads of a known sound;
+    - `sensors.bin.gz`: a part of a walk as the sensors have it, for who makes readings of them.
 
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit status.
+    Args:
+        policy: What walks.
+        policy_file: The file that it is from, whose digest is kept.
+        out: Where to.
 
     Raises:
-        MuteError: If an argument is bad, the policy cannot be used or falls, or a file not be
-            written.
+        MuteError: If a robot falls, or a file cannot be written.
     """
-    args = parse(ReferenceArgs, command_line() if argv is None else argv, __doc__ or "")
-    policy = load_audible_policy(args.policy)
-    make_directory(args.out)
-    use_collection_threads()
+    out.mkdir(parents=True, exist_ok=True)
     walks: dict[str, Any] = {}
     recorded: dict[str, Any] = {}
+    files: dict[str, bytes] = {}
     settings = [(surface, beta) for surface in _SURFACES for beta in _BETAS]
     for surface, beta in [*settings, *_MORE]:
         name = f"{surface}-{beta:g}"
-        block, sensed = _walk(policy, surface, beta, args.seed)
+        block, sensed = _walk(policy, surface, beta)
         kept = _quantised(block)
-        write_file(args.out / f"{name}.bin.gz", gzip.compress(_coded(kept), 9, mtime=0))
-        walks[name] = _heard(_decoded(kept), surface, args.seed)
-        if len(walks) == 1:
-            write_file(args.out / "sensors.bin.gz", gzip.compress(sensed.coded(), 9, mtime=0))
+        files[f"{name}.bin.gz"] = gzip.compress(_coded(kept), 9, mtime=0)
+        walks[name] = _heard(_decoded(kept), surface)
+        if not recorded:
+            files["sensors.bin.gz"] = gzip.compress(sensed.coded(), 9, mtime=0)
             recorded = _recorded(block, sensed)
-        tell(f"{name}: {walks[name]['mnl']:.1f} dBA")
     content = {
-        "policy_sha256": file_sha256(args.policy),
-        "timestep": 0.001,
+        "policy_sha256": file_sha256(policy_file),
+        "timestep": TIMESTEP,
         "steps": STEPS,
         "noise_seeds": _NOISE_SEEDS,
         "bands": [[band.low, band.high] for band in third_octaves(SAMPLE_RATE)],
@@ -132,8 +117,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         "walks": walks,
     }
     text = json.dumps(content, allow_nan=False, indent=1) + "\n"
-    write_file(args.out / "references.json", text.encode())
-    return 0
+    files["references.json"] = text.encode()
+    for name, data in files.items():
+        write_file(out / name, data)
+    return [out / name for name in files]
 
 
 @dataclass
@@ -171,7 +158,7 @@ def _sense(env: QuadrupedEnv) -> _Sensed:
     return sensed
 
 
-def _walk(policy: Policy, surface: str, beta: float, seed: int) -> tuple[ContactBlock, _Sensed]:
+def _walk(policy: Policy, surface: str, beta: float) -> tuple[ContactBlock, _Sensed]:
     """Return what one robot does on a floor, and what its sensors say.
 
     Raises:
@@ -179,7 +166,7 @@ def _walk(policy: Policy, surface: str, beta: float, seed: int) -> tuple[Contact
     """
     dt = policy.cfg.env.step_dt
     steps = round((_WARM_UP + _SECONDS) / dt)
-    cfg = robots_cfg(policy, 1, (steps + 1) * dt, seed)
+    cfg = robots_cfg(policy, 1, (steps + 1) * dt, _SEED)
     env = make_listening_env(cfg, surface)
     session = Session(env, LearnedController(policy, 1), Command(_SPEED, beta=beta))
     recorder = Recorder(env)
@@ -191,7 +178,7 @@ def _walk(policy: Policy, surface: str, beta: float, seed: int) -> tuple[Contact
     for _ in range(steps - before):
         session.step()
     if int(env.episode_length_buf[0]) != steps:
-        raise MuteError(f"the robot of seed {seed} fell on {surface} at beta {beta:g}")
+        raise MuteError(f"the robot of seed {_SEED} fell on {surface} at beta {beta:g}")
     return recorder.take(), sensed
 
 
@@ -273,9 +260,9 @@ def _decoded(kept: dict[str, NDArray[np.int64]]) -> ContactBlock:
     feet = value["foot_position"].reshape(steps, 1, len(LEGS), 3)
     return ContactBlock(
         start=0.0,
-        timestep=0.001,
+        timestep=TIMESTEP,
         impacts=Impacts(
-            time=step * 0.001,
+            time=step * TIMESTEP,
             robot=np.zeros(len(step), np.int64),
             foot=foot,
             speed=value["landing_speed"][step, foot].astype(np.float64),
@@ -294,15 +281,15 @@ def _decoded(kept: dict[str, NDArray[np.int64]]) -> ContactBlock:
     )
 
 
-def _heard(block: ContactBlock, surface: str, seed: int) -> dict[str, Any]:
+def _heard(block: ContactBlock, surface: str) -> dict[str, Any]:
     """Return levels and third octaves of a walk, in all and by source."""
 
     def render(source: str, own: int) -> NDArray[np.float64]:
         return Soundscape(1, [surface], seed=own, sources=(source,)).render(block)[0].astype(float)
 
-    steady = {name: render(name, seed) for name in ("impacts", "body", "drive")}
+    steady = {name: render(name, 0) for name in ("impacts", "body", "drive")}
     drawn = [
-        {name: render(name, seed + number) for name in ("scuffing", "fan")}
+        {name: render(name, number) for name in ("scuffing", "fan")}
         for number in range(_NOISE_SEEDS)
     ]
     whole = [sum([*steady.values(), *own.values()]) for own in drawn]
@@ -314,7 +301,7 @@ def _heard(block: ContactBlock, surface: str, seed: int) -> dict[str, Any]:
         **_figures([np.asarray(sound) for sound in whole]),
         "sources": {name: _figures(sounds) for name, sounds in sources.items()},
         "landings": [
-            [round(float(time) / 0.001), int(foot), float(speed), float(mass)]
+            [round(float(time) / TIMESTEP), int(foot), float(speed), float(mass)]
             for time, foot, speed, mass in zip(
                 landings.time, landings.foot, landings.speed, landings.mass, strict=True
             )
@@ -380,7 +367,3 @@ def _metered() -> dict[str, float]:
     meter = SoundLevelMeter(SAMPLE_RATE)
     meter.update((sweep + 0.1).astype(np.float32))
     return dataclasses.asdict(meter.result()[0])
-
-
-if __name__ == "__main__":
-    run_cli(main)

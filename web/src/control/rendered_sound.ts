@@ -4,7 +4,7 @@
  */
 
 import { LevelMeter } from "../sound/level_meter.js";
-import { PROCESSOR, type ProcessorOptions, type ToProcessor } from "../sound/messages.js";
+import { FULL_SCALE, PROCESSOR, type ProcessorOptions, type ToProcessor } from "../sound/messages.js";
 import { SETTLING } from "../sound/playback.js";
 import { READINGS_LENGTH } from "../sound/readings.js";
 import type { SoundTables } from "../sound/tables.js";
@@ -15,9 +15,6 @@ const SUPPLY = 0.2;
 
 /** Time that the audio thread takes to notice a delivery, ms. */
 const NOTICE = 15;
-
-/** Sound pressure of a full-scale sample of the worklet, Pa. */
-const FULL_SCALE = 2;
 
 /** Samples of a quantum of Web Audio, at whose ends alone it can be halted. */
 const QUANTUM = 128;

@@ -183,3 +183,39 @@ test("a walk that begins anew has figures of its own, and what waits is left out
   play(playback, 2.4, feeder(playback));
   assert.ok(playback.meter.mnl < 67, `${playback.meter.mnl} dBA on carpet`);
 });
+
+test("the audio thread makes no arrays as it plays", () => {
+  const playback = new Playback(tables, { surface: "wood" });
+  const batches = Array.from({ length: 100 }, (_, index) => steps(20 * index, 20));
+  const out = new Float32Array(128);
+  const arrays = [Float32Array, Float64Array, Int32Array] as const;
+  const made: string[] = [];
+  const forbidden = (name: string, own: Function) =>
+    new Proxy(own, {
+      construct(target, given) {
+        made.push(name);
+        return Reflect.construct(target, given) as object;
+      },
+    });
+  const subarrays = arrays.map((own) => own.prototype.subarray);
+  try {
+    arrays.forEach((own) => {
+      Object.assign(globalThis, { [own.name]: forbidden(own.name, own) });
+      own.prototype.subarray = () => {
+        throw new Error("a view is an allocation, too");
+      };
+    });
+    for (const [index, batch] of batches.entries()) {
+      playback.feed(batch);
+      if (index === 50) playback.setSurface("tile");
+      for (let block = 0; block < 7; block++) playback.play(out);
+    }
+  } finally {
+    arrays.forEach((own, index) => {
+      Object.assign(globalThis, { [own.name]: own });
+      own.prototype.subarray = subarrays[index] as never;
+    });
+  }
+  assert.deepEqual(made, []);
+  assert.ok(playback.meter.level > 50, "nothing was played");
+});
