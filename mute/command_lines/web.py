@@ -9,6 +9,7 @@ from pathlib import Path
 from mute.command_lines.arguments import command_line, make_directory, parse
 from mute.command_lines.policy_options import PolicyArgs, check_audible
 from mute.controllers import load_policy
+from mute.controllers.learned import Policy
 from mute.support.errors import MuteError
 from mute.web.assets import write_assets
 from mute.web.sound_references import write_sound_references
@@ -22,6 +23,9 @@ class WebArgs(PolicyArgs):
 
     out: Path = Path("web/assets")
     """Directory of the page's assets, whose files are replaced."""
+    also: tuple[Path, ...] = ()
+    """Checkpoints of further policies for the page's list of controllers, each of a task of its
+    own: baselines, say."""
     reference: Path | None = None
     """Walk in Python as well, and keep in this directory what the page's tests hold it to; needs
     the extra `onnx`."""
@@ -38,10 +42,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     argv = command_line() if argv is None else argv
     args = parse(WebArgs, argv, "Write what the page in web/ needs of Python.")
     args = args.with_policy_found()
-    policy = load_policy(args.policy)
-    check_audible(policy, str(args.policy))
+    policy = _audible(args.policy)
+    others = [_audible(path) for path in args.also]
     make_directory(args.out)
-    files = write_assets(policy, args.out)
+    try:
+        files = write_assets([policy, *others], args.out)
+    except ValueError as error:
+        raise MuteError(f"--also: {error}") from error
     if args.reference is not None:
         make_directory(args.reference, "reference")
         try:
@@ -55,3 +62,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     for file in files:
         print(f"wrote {file}")
     return 0
+
+
+def _audible(path: Path) -> Policy:
+    """Return a policy that can be heard.
+
+    Raises:
+        MuteError: If it cannot be used.
+    """
+    policy = load_policy(path)
+    check_audible(policy, str(path))
+    return policy

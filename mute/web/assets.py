@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,36 +35,50 @@ __all__ = ["FORMAT", "write_assets"]
 FORMAT = 1
 """Version of the layout of `page.json`; the page refuses any other."""
 
+_LABELS = {
+    "go1_mute": "MUTE",
+    "go1_dreamwaq": "DreamWaQ",
+    "go1_mute_paper": "MUTE, as in the paper",
+}
+"""What controllers are called in the page's list, by their task; others by its name."""
+
 _SURFACE = "wood"
 """Floor that the page begins with."""
 
 
-def write_assets(policy: Policy, out: Path) -> list[Path]:
+def write_assets(policies: Sequence[Policy], out: Path) -> list[Path]:
     """Write all files into a directory, which is made if need be, and return them.
 
+    The first policy drives when the page begins, and its task is the world; each is named after its
+    task.
+
     - `flat.xml`, `stairs.xml`: the scenes, see `scene_text`;
-    - `TASK.onnx`: the policy, see `mute.controllers.onnx_export.export_policy`;
+    - `TASK.onnx`: a policy, see `mute.controllers.onnx_export.export_policy`;
     - `page.json`: all else that the simulation needs, see `page_data`;
     - `sound.json`, `sound.bin`: see `mute.web.sound_tables`.
 
     Raises:
         MuteError: If a file cannot be written.
-        ValueError: If the policy acts at times between the physics steps of sound.
+        ValueError: If two policies are of one task, or the first acts at times between the physics
+            steps of sound.
     """
-    cfg = walking_cfg(policy.cfg.env, _SURFACE, 1.0)
+    tasks = [policy.task for policy in policies]
+    if len(set(tasks)) < len(tasks):
+        raise ValueError(f"policies must be of different tasks, got {', '.join(tasks)}")
+    cfg = walking_cfg(policies[0].cfg.env, _SURFACE, 1.0)
     out.mkdir(parents=True, exist_ok=True)
-    policy_file = out / f"{policy.task}.onnx"
-    export_policy(policy, policy_file)
+    for policy in policies:
+        export_policy(policy, out / f"{policy.task}.onnx")
     written = {
         "flat.xml": scene_text(scene_of(cfg)).encode(),
         "stairs.xml": scene_text(_with_boxes(scene_of(cfg))).encode(),
-        "page.json": _json(page_data(policy, cfg)),
+        "page.json": _json(page_data(policies, cfg)),
     }
     sound_json, sound_binary = packed(sound_tables())
     written |= {"sound.json": sound_json.encode(), "sound.bin": sound_binary}
     for name, data in written.items():
         write_file(out / name, data)
-    return [policy_file, *(out / name for name in written)]
+    return [out / name for name in (*(f"{task}.onnx" for task in tasks), *written)]
 
 
 def walking_cfg(
@@ -80,18 +95,23 @@ def walking_cfg(
     return listening_cfg(from_the_stance(evaluation_cfg(cfg, 1, seconds, seed)), surface)
 
 
-def page_data(policy: Policy, cfg: QuadrupedEnvCfg) -> dict[str, Any]:
+def page_data(policies: Sequence[Policy], cfg: QuadrupedEnvCfg) -> dict[str, Any]:
     """Return what `page.json` holds. Lengths in m, times in s, angles in rad.
 
     Args:
-        policy: The policy that ships.
+        policies: What drives, the one that the page begins with first.
         cfg: What it walks in, see `walking_cfg`.
     """
-    speeds = policy.cfg.env.commands
+    speeds = policies[0].cfg.env.commands
     return {
         "format": FORMAT,
         "controllers": [
-            {"name": policy.task, "label": "MUTE", "file": f"{policy.task}.onnx"},
+            {
+                "name": policy.task,
+                "label": _LABELS.get(policy.task, policy.task),
+                "file": f"{policy.task}.onnx",
+            }
+            for policy in policies
         ],
         "legs": LEGS,
         "joint_names": JOINT_NAMES,

@@ -15,6 +15,7 @@ import pytest
 from places import REPOSITORY, RESOURCES
 
 from mute.acoustics.floors import FLOORS
+from mute.checkpoint import load_checkpoint, save_checkpoint
 from mute.command_lines.web import main
 from mute.controllers import load_policy
 from mute.envs.quadruped_env import QuadrupedEnv, scene_of
@@ -98,3 +99,19 @@ def test_reference_walks_are_those_of_the_policy_that_ships():
 def test_a_policy_that_is_missing_is_told_of_in_one_line(tmp_path: Path):
     with pytest.raises(MuteError, match=r"nowhere\.pt"):
         main(["--policy", str(tmp_path / "nowhere.pt"), "--out", str(tmp_path)])
+
+
+def test_further_policies_come_into_the_list_of_controllers_unless_their_task_is_taken(
+    tmp_path: Path,
+):
+    with pytest.raises(MuteError, match="different tasks, got go1_mute, go1_mute"):
+        main(["--out", str(tmp_path), "--also", str(SHIPPED)])
+    other = load_checkpoint(SHIPPED) | {"task": "go1_other"}
+    save_checkpoint(tmp_path / "other.pt", other)
+    assert main(["--out", str(tmp_path), "--also", str(tmp_path / "other.pt")]) == 0
+    controllers = json.loads((tmp_path / "page.json").read_text())["controllers"]
+    assert [(one["label"], one["file"]) for one in controllers] == [
+        ("MUTE", "go1_mute.onnx"),
+        ("go1_other", "go1_other.onnx"),
+    ]
+    assert (tmp_path / "go1_other.onnx").is_file()
