@@ -22,6 +22,7 @@ from mute.acoustics.contacts import ContactBlock, Impacts
 from mute.acoustics.metering.levels import P_REF
 from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
 from mute.acoustics.metering.third_octaves import third_octaves
+from mute.acoustics.microphone import Microphone
 from mute.acoustics.recorder import Recorder
 from mute.acoustics.soundscape import SOURCES, Soundscape
 from mute.acoustics.sources.landings import place_struck
@@ -38,7 +39,7 @@ from mute.support.files import write_file
 from mute.support.provenance import file_sha256
 from mute.web.sound_tables import SAMPLE_RATE
 
-__all__ = ["STEPS", "write_sound_references"]
+__all__ = ["STEPS", "heard_figures", "read_walk", "write_sound_references"]
 
 STEPS = {
     "landing_speed": 1e-4,
@@ -69,6 +70,8 @@ _SPEED = 0.5
 _WARM_UP = 1.0
 """Time walked before, s."""
 _SECONDS = 2.5
+_BESIDE = (0.2, 1.0, 1.2)
+"""Where a listener walks along who hears the walks at beta 0 as well, m."""
 _NOISE_SEEDS = 8
 """Draws of the noise whose mean is taken: what is drawn differs, its mean does not."""
 _SENSED = 400
@@ -93,6 +96,7 @@ def write_sound_references(policy: Policy, policy_file: Path, out: Path) -> list
     """
     out.mkdir(parents=True, exist_ok=True)
     walks: dict[str, Any] = {}
+    beside: dict[str, Any] = {}
     recorded: dict[str, Any] = {}
     files: dict[str, bytes] = {}
     settings = [(surface, beta) for surface in _SURFACES for beta in _BETAS]
@@ -101,7 +105,10 @@ def write_sound_references(policy: Policy, policy_file: Path, out: Path) -> list
         block, sensed = _walk(policy, surface, beta)
         kept = _quantised(block)
         files[f"{name}.bin.gz"] = gzip.compress(_coded(kept), 9, mtime=0)
-        walks[name] = _heard(_decoded(kept), surface)
+        own = _decoded(kept)
+        walks[name] = heard_figures(own, surface)
+        if beta == _BETAS[0]:
+            beside[name] = _figures([_beside(own, surface, seed) for seed in range(_NOISE_SEEDS)])
         if not recorded:
             files["sensors.bin.gz"] = gzip.compress(sensed.coded(), 9, mtime=0)
             recorded = _recorded(block, sensed)
@@ -111,6 +118,8 @@ def write_sound_references(policy: Policy, policy_file: Path, out: Path) -> list
         "steps": STEPS,
         "noise_seeds": _NOISE_SEEDS,
         "bands": [[band.low, band.high] for band in third_octaves(SAMPLE_RATE)],
+        "beside": {"offset": _BESIDE, "walks": beside},
+        "microphones": _microphones(),
         "recorded": recorded,
         "places": _places(),
         "meter": _metered(),
@@ -239,6 +248,28 @@ def _coded(kept: dict[str, NDArray[np.int64]]) -> bytes:
     return bytes(coded)
 
 
+def _uncoded(coded: bytes) -> dict[str, NDArray[np.int64]]:
+    """Return the readings that `_coded` made bytes of."""
+    digits = np.frombuffer(coded, np.uint8).astype(np.int64)
+    ends = np.flatnonzero(digits < 128)
+    begins = np.concatenate(([0], ends[:-1] + 1))
+    place = np.arange(len(digits)) - np.repeat(begins, ends - begins + 1)
+    whole = np.add.reduceat((digits & 127) << (7 * place), begins)
+    values = np.where(whole % 2 == 0, whole // 2, -(whole + 1) // 2)
+    widths = [_WIDTHS.get(name, len(LEGS)) for name in STEPS]
+    columns = values.reshape(sum(widths), -1)
+    kept = {}
+    for name, part in zip(STEPS, np.split(columns, np.cumsum(widths)[:-1]), strict=True):
+        summed = part.cumsum(axis=1)
+        kept[name] = (summed if name in _STEADY else summed.cumsum(axis=1)).T
+    return kept
+
+
+def read_walk(path: Path) -> ContactBlock:
+    """Return a walk that was kept, as it is heard."""
+    return _decoded(_uncoded(gzip.decompress(path.read_bytes())))
+
+
 _STEADY = (
     "landing_speed",
     "landing_mass",
@@ -281,7 +312,7 @@ def _decoded(kept: dict[str, NDArray[np.int64]]) -> ContactBlock:
     )
 
 
-def _heard(block: ContactBlock, surface: str) -> dict[str, Any]:
+def heard_figures(block: ContactBlock, surface: str) -> dict[str, Any]:
     """Return levels and third octaves of a walk, in all and by source."""
 
     def render(source: str, own: int) -> NDArray[np.float64]:
@@ -307,6 +338,35 @@ def _heard(block: ContactBlock, surface: str) -> dict[str, Any]:
             )
         ],
     }
+
+
+def _beside(block: ContactBlock, surface: str, seed: int) -> NDArray[np.float64]:
+    """Return the sound of a walk as a listener hears it who walks along."""
+    microphone = Microphone(_BESIDE, "beside")
+    return Soundscape(1, [surface], microphone, seed=seed).render(block)[0].astype(float)
+
+
+def _microphones() -> list[dict[str, Any]]:
+    """Return where microphones are that go with trunks of all poses."""
+    generator = np.random.default_rng(1)
+    block = Impacts.none()
+    found = []
+    for _ in range(12):
+        offset, trunk = generator.uniform(-1.0, 1.0, (2, 3))
+        quat = generator.normal(size=4)
+        quat /= np.linalg.norm(quat)
+        nothing = np.zeros((1, 1, 4))
+        pose = ContactBlock(
+            0.0, TIMESTEP, block, nothing, np.zeros((1, 1, 4, 3)), nothing, nothing, nothing,
+            nothing, trunk[None, None], quat[None, None],
+        )  # fmt: skip
+        at = {
+            mount: Microphone(tuple(offset), mount).position(pose)[0, 0].tolist()
+            for mount in ("trunk", "beside", "world")
+        }
+        own = {"offset": offset.tolist(), "trunk": trunk.tolist(), "quaternion": quat.tolist()}
+        found.append(own | {"at": at})
+    return found
 
 
 def _figures(sounds: list[NDArray[np.float64]]) -> dict[str, Any]:

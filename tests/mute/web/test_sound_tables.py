@@ -145,8 +145,9 @@ def test_what_is_radiated_at_once_is_that_of_the_plate(tables, name):
     plate = FLOORS[name].plate
     table = tables["floors"][name]["plate"]
     frequency = np.geomspace(20.0, 4000.0, 60)
-    _, response = signal.freqz_sos(table["direct"], frequency, fs=SAMPLE_RATE)
-    ours = table["direct_gain"] * np.abs(response)
+    z = np.exp(2j * np.pi * frequency / SAMPLE_RATE)
+    sections = [np.polyval(s[:3], z) / np.polyval(s[3:], z) for s in table["direct"]]
+    ours = table["direct_gain"] * np.abs(np.prod(sections, axis=0))
     wanted = np.abs(plate.direct_pressure(frequency))
     # A dashpot in the place of a loss differs a little about the resonance of what floats.
     np.testing.assert_allclose(20.0 * np.log10(ours / wanted), 0.0, atol=0.5)

@@ -15,10 +15,14 @@ import type { SoundTables } from "./tables.js";
 const VOLUME_TIME = 0.02;
 
 /**
- * Gain of the volume 1: a sound pressure of 1 Pa, 91 dB of a tone, is as loud as can be. Loudspeakers
- * of small machines are too quiet for a walk at full scale.
+ * Gain of the volume 1: a sound pressure of 2.5 Pa is as loud as can be. At the full scale of 10 Pa,
+ * which nothing exceeds, small loudspeakers would be too quiet for a walk.
  */
-const LOUDNESS = FULL_SCALE / 1;
+const LOUDNESS = FULL_SCALE / 2.5;
+
+/** Frequency below which it is not played, Hz: few loudspeakers give it, and boards struck by a foot
+ * have so much of it that it would leave the rest no room. Levels know nothing of this. */
+const LOWEST = 50;
 
 /** Samples beyond full scale that can still be told apart, in full scales. */
 const BEYOND = 8;
@@ -105,7 +109,8 @@ export async function startPlayer(
       processorOptions,
     });
     const volume = new GainNode(context, { gain: LOUDNESS });
-    limit(context, node.connect(volume)).connect(context.destination);
+    const lowCut = new BiquadFilterNode(context, { type: "highpass", frequency: LOWEST, Q: -3 });
+    limit(context, node.connect(lowCut).connect(volume)).connect(context.destination);
     await context.resume();
     return new Player(context, node, volume);
   } catch (error) {

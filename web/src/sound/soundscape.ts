@@ -82,8 +82,14 @@ export class Soundscape {
     return this.capacity;
   }
 
-  /** Takes the next physics step, to be heard after those before; of too many the oldest goes. */
+  /**
+   * Takes the next physics step, to be heard after those before; of too many the oldest goes. One that
+   * holds no numbers, of a simulation that blew up, is left out: it would never stop to be heard.
+   */
   step(readings: ContactReadings): void {
+    for (let i = 0; i < READINGS_LENGTH; i++) {
+      if (!Number.isFinite(readings.packed[i])) return;
+    }
     if (this.count === this.capacity) this.skip(1);
     const place = (this.first + this.count) % this.capacity;
     this.waiting.set(readings.packed, place * READINGS_LENGTH);

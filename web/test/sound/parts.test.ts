@@ -5,6 +5,7 @@ import { test } from "node:test";
 import { Blow } from "../../src/sound/blow";
 import { placeStruck } from "../../src/sound/landings";
 import { LevelMeter } from "../../src/sound/level_meter";
+import { Microphone } from "../../src/sound/microphone";
 import { FEET, READINGS_LENGTH, viewReadings } from "../../src/sound/readings";
 import { Recorder } from "../../src/sound/recorder";
 import { type FloorTable, type LawTable, loadSoundTables } from "../../src/sound/tables";
@@ -120,6 +121,23 @@ test("blows strike the places that Python's strike", () => {
   for (const [x, y, place] of references.places) {
     assert.equal(placeStruck(x, y, tables.landing.place_size, 12), place, `${x}, ${y}`);
   }
+});
+
+test("microphones are where Python's are, whatever the trunk does", () => {
+  const readings = viewReadings();
+  for (const { offset, trunk, quaternion, at } of references.microphones) {
+    readings.trunkPosition.set(trunk);
+    readings.trunkQuaternion.set(quaternion);
+    for (const mount of ["trunk", "beside", "world"] as const) {
+      const microphone = new Microphone(mount, offset, 0.05);
+      microphone.follow(readings);
+      at[mount].forEach((wanted, axis) => {
+        const off = (microphone.at[axis] as number) - wanted;
+        assert.ok(Math.abs(off) < 1e-6, `${mount}: ${off} m`);
+      });
+    }
+  }
+  assert.equal(new Microphone("world", [0, 0, 0], 0.05).distance(0, 0.01, 0), 0.05);
 });
 
 test("a blow passes its impulse, wherever between samples it begins and at whatever rate", () => {

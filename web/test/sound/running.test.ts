@@ -80,6 +80,26 @@ test("a stand is the fan's 55 dBA at the trunk, and its 1/r elsewhere", () => {
   assert.ok(Math.abs(beside - (55 - 6.02)) < 0.3, `${beside} dBA at twice the distance`);
 });
 
+test("a landing sounds the same at other physics steps", () => {
+  const landing = standing(1);
+  viewReadings(landing).landingSpeed[2] = 0.4;
+  viewReadings(landing).landingMass[2] = 0.6;
+  const still = standing(1);
+  const [fine, coarse] = [0.001, 0.002].map((timestep) => {
+    const soundscape = createSoundscape(tables, { surface: "tile", timestep, sources: ["impacts", "body"] });
+    soundscape.step(viewReadings(landing));
+    for (let time = timestep; time < 0.3; time += timestep) soundscape.step(viewReadings(still));
+    const out = new Float32Array(0.3 * 48000);
+    soundscape.render(out);
+    return out;
+  }) as [Float32Array, Float32Array];
+  const peak = fine.reduce((most, own) => Math.max(most, Math.abs(own)), 0);
+  assert.ok(peak > 0.1, `${peak} Pa`);
+  fine.forEach((sample, i) => {
+    assert.ok(Math.abs(sample - (coarse[i] as number)) < 1e-3 * peak, `sample ${i}`);
+  });
+});
+
 test("another floor is heard from the next landing on, and the old one rings out", () => {
   const soundscape = createSoundscape(tables, { surface: "wood", sources: ["impacts"] });
   const before = render(soundscape, 0, 1200);
@@ -119,6 +139,18 @@ test("where readings run out it fades within milliseconds, and goes on without a
   assert.ok(Math.max(...gap.subarray(1440).map(Math.abs)) < 1e-4);
   const after = render(soundscape, 500, 500);
   assert.ok(steepest(before, gap, after) <= 1.01 * steepest(before, after), "it clicks");
+});
+
+test("a simulation that blew up is not heard, and what comes after it is", () => {
+  const soundscape = createSoundscape(tables, { surface: "wood" });
+  const before = level(render(soundscape, 0, 1000));
+  const broken = viewReadings();
+  for (const value of [NaN, Infinity]) {
+    broken.packed.fill(value);
+    soundscape.step(broken);
+  }
+  assert.equal(soundscape.queued, 0);
+  assert.ok(Math.abs(level(render(soundscape, 0, 1000)) - before) < 0.5);
 });
 
 test("of too many steps the oldest go", () => {

@@ -85,6 +85,16 @@ function assertLevels(heard: Figures, wanted: Figures, most: number, name: strin
   }
 }
 
+test("a listener who walks along hears what Python's hears", () => {
+  const microphone = { mount: "beside", offset: references.beside.offset } as const;
+  for (const [name, wanted] of Object.entries(references.beside.walks)) {
+    const surface = name.split("-")[0] as string;
+    const readings = readWalk(name, references);
+    const sounds = [1, 2].map((seed) => hear(tables, readings, { surface, seed, microphone }));
+    assertLevels(figures(sounds, tables, references.bands), wanted, 0.2, name);
+  }
+});
+
 test("a source sounds the same alone as among the others", () => {
   const readings = readWalk("wood-0", references).subarray(0, 600 * READINGS_LENGTH);
   const alone = SOURCES.map((source) =>

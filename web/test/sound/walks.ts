@@ -3,6 +3,7 @@
 import { readFileSync } from "node:fs";
 import { gunzipSync } from "node:zlib";
 import { FEET, READINGS_LENGTH } from "../../src/sound/readings";
+import type { Mount } from "../../src/sound/microphone";
 import { loadSoundTables, type SoundTables } from "../../src/sound/tables";
 
 /** Files are found from `web/`, where the tests are started. */
@@ -30,6 +31,18 @@ export interface References {
   readonly noise_seeds: number;
   /** Edges of the third octaves, Hz. */
   readonly bands: readonly (readonly [number, number])[];
+  /** Walks as a listener hears them who walks along. */
+  readonly beside: {
+    readonly offset: readonly number[];
+    readonly walks: Readonly<Record<string, Figures>>;
+  };
+  /** Where microphones are that go with some trunks. */
+  readonly microphones: readonly {
+    readonly offset: readonly number[];
+    readonly trunk: readonly number[];
+    readonly quaternion: readonly number[];
+    readonly at: Readonly<Record<Mount, readonly number[]>>;
+  }[];
   readonly recorded: {
     readonly friction: number;
     readonly sliding: readonly (readonly [number, number, number])[];
