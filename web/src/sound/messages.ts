@@ -21,7 +21,7 @@ export interface ProcessorOptions {
 export type ToProcessor =
   | { readonly kind: "readings"; readonly batch: Float32Array }
   | { readonly kind: "surface"; readonly name: string }
-  | { readonly kind: "reset" };
+  | { readonly kind: "reset"; readonly walk: number };
 
 /** Levels in dBA; NaN before there is one. */
 export interface Levels {
@@ -38,4 +38,6 @@ export interface Levels {
 export interface FromProcessor extends Levels {
   /** Time that waits to be heard, s. */
   readonly waiting: number;
+  /** Number of the walk that this is of: that of the last reset, or 0. */
+  readonly walk: number;
 }

@@ -31,13 +31,17 @@ const BEYOND = 8;
 export class Player {
   /** Is told the levels, twenty times a second while there is sound. */
   onLevels: ((levels: Levels) => void) | null = null;
+  private walk = 0;
 
   constructor(
     private readonly context: AudioContext,
     private readonly node: AudioWorkletNode,
     private readonly volume: GainNode,
   ) {
-    node.port.onmessage = (event: MessageEvent<FromProcessor>) => this.onLevels?.(event.data);
+    node.port.onmessage = (event: MessageEvent<FromProcessor>) => {
+      // What was said before the audio thread heard of a new walk is of the one before.
+      if (event.data.walk === this.walk) this.onLevels?.(event.data);
+    };
   }
 
   /** Takes physics steps in the order of time; the array is given away where it can be. */
@@ -54,7 +58,8 @@ export class Player {
 
   /** The walk begins anew, and so do its figures. */
   reset(): void {
-    this.node.port.postMessage({ kind: "reset" } satisfies ToProcessor);
+    this.walk++;
+    this.node.port.postMessage({ kind: "reset", walk: this.walk } satisfies ToProcessor);
   }
 
   /** Sets the volume, 1 unless told. Levels do not change with it. */

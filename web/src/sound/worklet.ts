@@ -25,6 +25,7 @@ class SoundProcessor extends AudioWorkletProcessor {
   private readonly playback: Playback;
   private readonly readingsPerSecond: number;
   private silent = 0;
+  private walk = 0;
 
   constructor(options: { processorOptions: ProcessorOptions }) {
     super();
@@ -37,7 +38,12 @@ class SoundProcessor extends AudioWorkletProcessor {
   private hear(message: ToProcessor): void {
     if (message.kind === "readings") this.playback.feed(message.batch);
     else if (message.kind === "surface") this.playback.setSurface(message.name);
-    else this.playback.reset();
+    else this.begin(message.walk);
+  }
+
+  private begin(walk: number): void {
+    this.walk = walk;
+    this.playback.reset();
   }
 
   process(_inputs: Float32Array[][], outputs: Float32Array[][]): boolean {
@@ -66,6 +72,7 @@ class SoundProcessor extends AudioWorkletProcessor {
       pnl,
       seconds: readings / this.readingsPerSecond,
       waiting,
+      walk: this.walk,
     };
     this.port.postMessage(told);
   }
