@@ -1,6 +1,6 @@
 """Walks in Python that the page's are held to: from the same state, on the same commands.
 
-Each is one robot from the exact stance on wood, driven by ONNX Runtime. What it did goes into files
+Each is one robot from the exact stance, driven by ONNX Runtime. What it did goes into files
 that are small enough to be kept beside the page's tests.
 """
 
@@ -44,8 +44,6 @@ _ACTED_STEPS = 500
 _FOLLOWED_STEPS = 100
 """Control steps of each walk whose states are kept: 2 s."""
 
-_SURFACE = "wood"
-
 
 @dataclass(frozen=True)
 class _Walk:
@@ -55,6 +53,7 @@ class _Walk:
     command: Command
     terrain: str = "flat"
     level: int = 0
+    surface: str = "wood"
 
 
 _WALKS = (
@@ -62,6 +61,7 @@ _WALKS = (
     _Walk("quiet", Command(vx=0.5, beta=1.0)),
     _Walk("turning", Command(vx=0.3, vy=0.1, wz=0.5, beta=0.5)),
     _Walk("stairs", Command(vx=0.5, beta=0.0), terrain="stairs"),
+    _Walk("carpet", Command(vx=0.4, beta=0.3), surface="carpet"),
 )
 
 
@@ -152,7 +152,7 @@ def _walk(policy: Policy, controller: OnnxController, walk: _Walk) -> dict[str, 
             positions.append([round(x, 7) for x in simulation.qpos[0].double().tolist()])
 
     steps = round(_SECONDS / env.step_dt)
-    with Listener(env, [_SURFACE], settle_time=_SETTLE_TIME) as listener:
+    with Listener(env, [walk.surface], settle_time=_SETTLE_TIME) as listener:
         command = walk.command.tensor()
         meter = run_trial(env, controller, command, steps, follow)
     levels = listener.levels()[0]
@@ -160,7 +160,7 @@ def _walk(policy: Policy, controller: OnnxController, walk: _Walk) -> dict[str, 
         "command": dataclasses.asdict(walk.command),
         "terrain": walk.terrain,
         "level": walk.level,
-        "surface": _SURFACE,
+        "surface": walk.surface,
         "seconds": _SECONDS,
         "settle_time": _SETTLE_TIME,
         "first_state": first,
@@ -174,4 +174,4 @@ def _walk(policy: Policy, controller: OnnxController, walk: _Walk) -> dict[str, 
 def _cfg(cfg: QuadrupedEnvCfg, walk: _Walk) -> QuadrupedEnvCfg:
     ground = TerrainCfg(kind=walk.terrain, first_levels=(walk.level, walk.level), curriculum=False)
     measured = evaluation_cfg(cfg, 1, _SECONDS, 0, terrain=ground)
-    return listening_cfg(from_the_stance(measured), _SURFACE)
+    return listening_cfg(from_the_stance(measured), walk.surface)

@@ -42,7 +42,9 @@ for (const name of readdirSync(out).sort()) {
   const file = readFileSync(join(out, name));
   const packed = gzipSync(file, { level: 9 }).length;
   sum += packed;
-  console.log(`${name.padEnd(18)} ${kilobytes(file.length)} kB, compressed ${kilobytes(packed)} kB`);
+  console.log(
+    `${name.padEnd(18)} ${kilobytes(file.length)} kB, compressed ${kilobytes(packed)} kB`,
+  );
 }
 console.log(`${"in all".padEnd(18)} compressed ${kilobytes(sum)} kB`);
 if (sum > HEAVIEST) {

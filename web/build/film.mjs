@@ -18,7 +18,12 @@ if (!out) {
   process.exit(2);
 }
 const dist = new URL("../dist", import.meta.url).pathname;
-const types = { html: "text/html", js: "text/javascript", css: "text/css", wasm: "application/wasm" };
+const types = {
+  html: "text/html",
+  js: "text/javascript",
+  css: "text/css",
+  wasm: "application/wasm",
+};
 
 /** Time between pictures, ms, and how many there are. */
 const PERIOD = 80;
@@ -50,7 +55,9 @@ await page.clock.install();
 await page.goto(`http://127.0.0.1:${server.address().port}/`);
 await page.waitForFunction(() => globalThis.mute !== undefined, null, { timeout: 120_000 });
 // Of a held clock there are no rates.
-await page.addStyleTag({ content: "#rates { visibility: hidden } :focus-visible { outline: none }" });
+await page.addStyleTag({
+  content: "#rates { visibility: hidden } :focus-visible { outline: none }",
+});
 const frames = mkdtempSync(join(tmpdir(), "film-"));
 for (let picture = 0; picture < PICTURES; picture++) {
   await SCRIPT[picture]?.(page);

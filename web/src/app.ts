@@ -12,22 +12,23 @@ import { listenToKeys } from "./input/keyboard.js";
 import type { Axis, Command, PageData } from "./physics/page_data.js";
 import type { Ground, Simulation } from "./physics/simulation.js";
 import type { Picture } from "./picture/picture.js";
-import { Policy, PolicyError } from "./policy/policy.js";
+import type { Policy } from "./policy/policy.js";
+import type { PolicyShelf } from "./policy/shelf.js";
 import { fromAddress, type Settings, toAddress } from "./settings/settings.js";
 import { listenToDrops } from "./ui/drop.js";
 import { anyElement } from "./ui/elements.js";
-import { Panel, type PanelActions } from "./ui/panel.js";
+import type { Panel, PanelActions } from "./ui/panel.js";
 
 /** What the page is made of. */
 export interface Parts {
   readonly page: PageData;
   readonly simulation: Simulation;
-  /** The policies of `page.controllers`, loaded when they are first wanted. */
-  readonly loadPolicy: (file: string) => Promise<Uint8Array>;
+  readonly shelf: PolicyShelf;
+  /** What drives at first, of the shelf. */
   readonly first: Policy;
   readonly settings: Settings;
   readonly picture: Picture | null;
-  readonly panel: (actions: PanelActions) => Panel;
+  readonly panel: Panel;
   /** Begins sound, in a gesture; null where this browser has none. */
   readonly startHearing: ((surface: string) => Promise<Hearing>) | null;
 }
@@ -46,11 +47,11 @@ const TICK = 8;
 export class App implements PanelActions {
   private readonly walk: Walk;
   private readonly steering: Steering;
+  private readonly shelf: PolicyShelf;
   private readonly panel: Panel;
   private readonly clock = new Clock();
   private readonly gamepad: GamepadInput;
   private readonly comparison: Comparison;
-  private readonly policies = new Map<string, Policy>();
   private readonly controlRate = new Rate();
   private readonly pictureRate = new Rate();
   private batcher: ReadingsBatcher;
@@ -68,12 +69,12 @@ export class App implements PanelActions {
     const { page, simulation, settings, first } = parts;
     this.settings = settings;
     this.steering = new Steering(settings.command, page.command.limits);
-    this.policies.set(settings.controller, first);
+    this.shelf = parts.shelf;
     simulation.setFloor(settings.floor);
     simulation.setGround(settings.ground, settings.level);
     this.walk = new Walk(simulation, first, page, settings.command);
     this.batcher = new ReadingsBatcher(simulation, first.decimation);
-    this.panel = parts.panel(this);
+    this.panel = parts.panel;
     this.comparison = new Comparison({
       begin: (beta) => this.beginCompared(beta),
       tell: (text, isRunning) => this.panel.showComparison(text, isRunning),
@@ -181,7 +182,8 @@ export class App implements PanelActions {
     this.keep({ ground: ground as Ground, level: Number(level) });
     this.parts.picture?.lookAhead(this.parts.simulation);
     this.begin();
-    const stairs = "The policy that ships has learnt on flat floors alone: it may stumble and fall.";
+    const stairs =
+      "The policy that ships has learnt on flat floors alone: it may stumble and fall.";
     this.panel.tell(ground === "flat" ? "The ground is flat." : stairs);
   }
 
@@ -283,13 +285,9 @@ export class App implements PanelActions {
 
   private async changeController(name: string): Promise<void> {
     this.comparison.stop();
-    const entry = this.parts.page.controllers.find((known) => known.name === name);
     try {
-      let policy = this.policies.get(name);
-      if (!policy && entry) policy = this.read(await this.parts.loadPolicy(entry.file));
-      if (!policy) throw new Error(`there is no controller ${name}`);
-      this.use(name, policy);
-      this.panel.tell(`${entry?.label ?? name} drives from now on.`);
+      this.use(name, await this.shelf.get(name));
+      this.panel.tell(`${this.shelf.label(name)} drives from now on.`);
     } catch (error) {
       this.panel.showSettings(this.settings);
       this.panel.tell(`${name}: ${messageOf(error)}`, true);
@@ -299,7 +297,7 @@ export class App implements PanelActions {
   private async openFile(file: File): Promise<void> {
     const name = file.name.slice(0, 60);
     try {
-      const policy = this.read(new Uint8Array(await file.arrayBuffer()));
+      const policy = await this.shelf.add(name, file);
       this.panel.addController(name, name);
       this.comparison.stop();
       this.use(name, policy);
@@ -309,14 +307,7 @@ export class App implements PanelActions {
     }
   }
 
-  private read(file: Uint8Array): Policy {
-    const { page, simulation } = this.parts;
-    const robot = { jointNames: page.joint_names, timestep: simulation.timestep };
-    return new Policy(file, robot);
-  }
-
   private use(name: string, policy: Policy): void {
-    this.policies.set(name, policy);
     this.walk.drive(policy);
     this.batcher = new ReadingsBatcher(this.parts.simulation, policy.decimation);
     this.begin();
@@ -379,6 +370,7 @@ export class App implements PanelActions {
   // -- what is shown and kept ------------------------------------------------------------------------
 
   private listen(): void {
+    this.panel.listen(this);
     listenToKeys(document, this);
     listenToDrops((file) => this.openPolicy(file));
     makeJoystick(anyElement("pad"), anyElement("knob"), (forward, left) =>
@@ -441,9 +433,8 @@ export class App implements PanelActions {
 
   private writeAddress(): void {
     this.addressDue = false;
-    const known = this.parts.page.controllers;
-    const shared = known.some(({ name }) => name === this.settings.controller);
-    const controller = shared ? this.settings.controller : known[0].name;
+    // A file of the visitor's own cannot be shared by an address.
+    const controller = this.shelf.shared(this.settings.controller);
     window.history.replaceState(null, "", toAddress({ ...this.settings, controller }));
   }
 
@@ -454,6 +445,5 @@ export class App implements PanelActions {
 }
 
 function messageOf(error: unknown): string {
-  if (error instanceof PolicyError || error instanceof Error) return error.message;
-  return String(error);
+  return error instanceof Error ? error.message : String(error);
 }

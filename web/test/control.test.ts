@@ -110,9 +110,14 @@ test("the boxes of stairs have their tops at the height that is told", () => {
   for (const level of [0, 4]) {
     const stairs = new Stairs(page.stairs, level);
     for (let x = -9; x < 9; x += 0.037) {
-      const over = [...stairs.near(x, 0.3)].filter(({ centre, half }) => Math.abs(x - centre[0]) < half[0]);
+      const over = [...stairs.near(x, 0.3)].filter(
+        ({ centre, half }) => Math.abs(x - centre[0]) < half[0],
+      );
       const top = Math.max(0, ...over.map(({ centre, half }) => centre[2] + half[2]));
-      assert.ok(Math.abs(top - stairs.height(x)) < 1e-9, `at ${x}: ${top}, told ${stairs.height(x)}`);
+      assert.ok(
+        Math.abs(top - stairs.height(x)) < 1e-9,
+        `at ${x}: ${top}, told ${stairs.height(x)}`,
+      );
     }
     assert.equal(stairs.height(0), 0);
   }
@@ -122,7 +127,10 @@ test("a machine that draws slowly is given less to draw, one that keeps up is no
   const slow = new PixelBudget(false);
   const shares = [slow.ratio(1)];
   for (let i = 0; i < 200; i++) if (slow.after(0.1)) shares.push(slow.ratio(1));
-  assert.deepEqual(shares, [...shares].sort((a, b) => b - a));
+  assert.deepEqual(
+    shares,
+    [...shares].sort((a, b) => b - a),
+  );
   assert.ok(slow.ratio(1) < 0.5 && !slow.shadows);
   const quick = new PixelBudget(false);
   for (let i = 0; i < 200; i++) assert.equal(quick.after(1 / 60), false);

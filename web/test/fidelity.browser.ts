@@ -10,21 +10,38 @@ let site: Site;
 before(async () => (site = await Site.open()));
 after(async () => site.close());
 
-const FIGURES = ["speed", "landing_speed_mean", "landing_speed_rms", "apex_mean", "duty_factor",
-  "stride_frequency", "power"] as const;
+const FIGURES = [
+  "speed",
+  "landing_speed_mean",
+  "landing_speed_rms",
+  "apex_mean",
+  "duty_factor",
+  "stride_frequency",
+  "power",
+] as const;
 
-for (const name of ["loud", "quiet", "turning"]) {
+// What a walk on stairs becomes hangs on whether a foot just meets an edge: it is tried in node.
+const flat = Object.entries(walks).filter(([, { terrain }]) => terrain === "flat");
+
+for (const [name, reference] of flat) {
   test(`the walk ${name} has Python's figures over 20 s`, async () => {
     const { page, errors } = await site.visit();
-    const reference = walks[name];
     const { command, seconds, surface, terrain, level, first_state } = reference;
     page.setDefaultTimeout(LONG.timeout);
     const measured = await page.evaluate((walk) => globalThis.mute!.measure(walk), {
-      command, seconds, surface, terrain, level, first_state,
+      command,
+      seconds,
+      surface,
+      terrain,
+      level,
+      first_state,
     });
     for (const figure of FIGURES) {
       const off = Math.abs(measured.gait[figure] / reference.gait[figure] - 1);
-      assert.ok(off < 0.03, `${figure} is ${measured.gait[figure]}, in Python ${reference.gait[figure]}`);
+      assert.ok(
+        off < 0.03,
+        `${figure} is ${measured.gait[figure]}, in Python ${reference.gait[figure]}`,
+      );
     }
     console.log(`${name}: MNL ${measured.mnl} dBA, in Python ${reference.mnl}`);
     assert.ok(Math.abs(measured.mnl - reference.mnl) < 0.5, `MNL is ${measured.mnl} dBA`);
@@ -34,13 +51,17 @@ for (const name of ["loud", "quiet", "turning"]) {
   });
 }
 
-// Less by what is clipped: the worklet plays up to 2 Pa, and feet on boards make more.
 test("the worklet's own samples have Python's level", async () => {
   const { page, errors } = await site.visit();
   const { command, surface, terrain, level, first_state, mnl, pnl } = walks.loud;
   page.setDefaultTimeout(LONG.timeout);
   const measured = await page.evaluate((walk) => globalThis.mute!.measureWorklet(walk), {
-    command, seconds: 20, surface, terrain, level, first_state,
+    command,
+    seconds: 20,
+    surface,
+    terrain,
+    level,
+    first_state,
   });
   console.log(`worklet: MNL ${measured.mnl} dBA, PNL ${measured.pnl}, in Python ${mnl} and ${pnl}`);
   assert.ok(Math.abs(measured.mnl - mnl) < 0.5, `MNL is ${measured.mnl} dBA`);
@@ -58,8 +79,8 @@ test("control keeps 50 Hz, and pictures come", async () => {
     `interactive after ${(begun / 1000).toFixed(2)} s, control ${control.toFixed(1)} Hz, ` +
       `pictures ${pictures.toFixed(1)}/s`,
   );
-  // A machine that others use as well gets half of what it could.
-  assert.ok(control > 45, `control is at ${control} Hz`);
-  assert.ok(pictures > 8, `there are ${pictures} pictures a second`);
+  // Of 50 and 30, on a machine that has nothing else to do; others may be busy.
+  assert.ok(control > 40, `control is at ${control} Hz`);
+  assert.ok(pictures > 5, `there are ${pictures} pictures a second`);
   await page.context().close();
 });

@@ -36,4 +36,7 @@ export interface ReferenceWalk {
   readonly pnl: number;
 }
 
-export const walks = JSON.parse(textOf(reference("walks.json"))).walks as Record<string, ReferenceWalk>;
+export const walks = JSON.parse(textOf(reference("walks.json"))).walks as Record<
+  string,
+  ReferenceWalk
+>;

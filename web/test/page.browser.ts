@@ -44,18 +44,28 @@ test("the robot walks at once, as fast as it is asked to", async () => {
 test("every slider, list and button does what it says", async () => {
   const opened = await site.visit();
   const { page } = opened;
-  for (const [id, value] of [["beta", "1"], ["vx", "0.3"], ["vy", "0.2"], ["wz", "-0.4"]]) {
+  for (const [id, value] of [
+    ["beta", "1"],
+    ["vx", "0.3"],
+    ["vy", "0.2"],
+    ["wz", "-0.4"],
+  ]) {
     await page.fill(`#${id}`, value);
     const { command } = await stateOf(page);
     assert.equal(command[id as "vx"], Number(value));
-    assert.match((await page.textContent(`#${id}-value`)) ?? "", new RegExp(Number(value).toFixed(2)));
+    assert.match(
+      (await page.textContent(`#${id}-value`)) ?? "",
+      new RegExp(Number(value).toFixed(2)),
+    );
   }
   await page.click("#stop");
   assert.deepEqual((await stateOf(page)).command, { vx: 0, vy: 0, wz: 0, beta: 1 });
   assert.equal(await page.textContent("#stop"), "Go");
   await page.click("#stop");
   assert.equal((await stateOf(page)).command.vx, 0.3);
-  for (const floor of await page.$$eval("#floor option", (all) => all.map((one) => one.textContent))) {
+  for (const floor of await page.$$eval("#floor option", (all) =>
+    all.map((one) => one.textContent),
+  )) {
     await page.selectOption("#floor", floor);
     assert.equal((await stateOf(page)).settings.floor, floor);
     assert.match(await opened.note(), new RegExp(`${floor}`));
@@ -95,7 +105,18 @@ test("a push is felt", async () => {
 test("keys steer, and leave a focused control alone", async () => {
   const opened = await site.visit({ hash: "#vx=0" });
   const { page } = opened;
-  const keys = ["ArrowUp", "KeyW", "KeyW", "KeyS", "ArrowLeft", "KeyA", "KeyD", "KeyQ", "KeyB", "KeyV"];
+  const keys = [
+    "ArrowUp",
+    "KeyW",
+    "KeyW",
+    "KeyS",
+    "ArrowLeft",
+    "KeyA",
+    "KeyD",
+    "KeyQ",
+    "KeyB",
+    "KeyV",
+  ];
   for (const key of keys) await page.keyboard.press(key);
   assert.deepEqual((await stateOf(page)).command, { vx: 0.2, vy: 0.1, wz: 0.1, beta: 0.5 });
   await page.keyboard.press("Space");
@@ -118,18 +139,22 @@ test("keys steer, and leave a focused control alone", async () => {
 test("every control can be reached by the tabulator, and has a name", async () => {
   const opened = await site.visit();
   const { page } = opened;
-  const wanted = await page.$$eval(
-    "button:not(:disabled), select, input, summary",
-    (all) => all.map((one) => one.id || one.tagName),
+  const wanted = await page.$$eval("button:not(:disabled), select, input, summary", (all) =>
+    all.map((one) => one.id || one.tagName),
   );
   const reached = new Set<string>();
   for (let i = 0; i < 2 * wanted.length; i++) {
     await page.keyboard.press("Tab");
     reached.add(
-      await page.evaluate(() => document.activeElement?.id || document.activeElement?.tagName || ""),
+      await page.evaluate(
+        () => document.activeElement?.id || document.activeElement?.tagName || "",
+      ),
     );
   }
-  assert.deepEqual(wanted.filter((id) => !reached.has(id)), []);
+  assert.deepEqual(
+    wanted.filter((id) => !reached.has(id)),
+    [],
+  );
   const nameless = await page.$$eval("button, select, input, canvas, output", (all) =>
     all
       .filter((one) => {
@@ -163,11 +188,16 @@ test("an address keeps what was set", async () => {
 
 test("a damaged address is told of in one line, and the rest of it holds", async () => {
   const opened = await site.visit({ hash: "#vx=fast&beta=1&floor=lava&colour=%E0%A4%A" });
-  assert.match(await opened.note(), /^Left out: the address has the unknown setting colour \(and 2 more\)\.$/);
+  assert.match(
+    await opened.note(),
+    /^Left out: the address has the unknown setting colour \(and 2 more\)\.$/,
+  );
   const { command, settings } = await stateOf(opened.page);
   assert.deepEqual([command.vx, command.beta, settings.floor], [0.5, 1, "wood"]);
   await opened.page.evaluate(() => (window.location.hash = "#floor=tile&vx=1e9"));
-  await opened.page.waitForFunction(() => /vx=1e9/.test(document.getElementById("note")!.textContent!));
+  await opened.page.waitForFunction(() =>
+    /vx=1e9/.test(document.getElementById("note")!.textContent!),
+  );
   assert.equal((await stateOf(opened.page)).settings.floor, "tile");
   await leave(opened);
 });
@@ -192,7 +222,10 @@ test("a foreign file that is dropped is refused in one line, an export of ours d
   const { page } = opened;
   const shipped = new Uint8Array(readFileSync("assets/go1_mute.onnx"));
   const told = (words: string) =>
-    page.waitForFunction((text) => document.getElementById("note")!.textContent!.includes(text), words);
+    page.waitForFunction(
+      (text) => document.getElementById("note")!.textContent!.includes(text),
+      words,
+    );
   await drop(page, "cat.onnx", new TextEncoder().encode("meow ".repeat(1000)));
   await told("cat.onnx is not taken: it is no policy that MUTE exported");
   await drop(page, "half.onnx", shipped.subarray(0, shipped.length >> 1));
@@ -201,7 +234,11 @@ test("a foreign file that is dropped is refused in one line, an export of ours d
   await drop(page, "mine.onnx", shipped);
   await told("mine.onnx drives from now on");
   assert.equal(await page.inputValue("#controller"), "mine.onnx");
-  await page.setInputFiles("#file", { name: "other.onnx", mimeType: "", buffer: Buffer.from(shipped) });
+  await page.setInputFiles("#file", {
+    name: "other.onnx",
+    mimeType: "",
+    buffer: Buffer.from(shipped),
+  });
   await told("other.onnx drives from now on");
   await leave(opened);
 });
@@ -269,7 +306,8 @@ test("a tap switches sound on, the meter shows its levels, and they begin anew w
   await page.click("#sound");
   await page.waitForSelector("#sound[aria-pressed=true]");
   const { level, mnl, pnl } = await levelsOf(page);
-  for (const value of [level, mnl, pnl]) assert.ok(value > 55 && value < 85, `it shows ${value} dBA`);
+  for (const value of [level, mnl, pnl])
+    assert.ok(value > 55 && value < 85, `it shows ${value} dBA`);
   await page.waitForFunction(() => /^\d\d\.\d$/.test(document.getElementById("mnl")!.textContent!));
   await until(page, (mute) => mute!.app.state.levels.seconds > 3);
   await opened.picture("sound");
@@ -298,7 +336,9 @@ test("a button compares ten seconds at beta 0 and at beta 1, and puts beta back"
   assert.equal((await stateOf(page)).command.beta, 0.3);
   await opened.picture("compared");
   await page.click("#compare");
-  await page.waitForFunction(() => /to go/.test(document.getElementById("comparison")!.textContent!));
+  await page.waitForFunction(() =>
+    /to go/.test(document.getElementById("comparison")!.textContent!),
+  );
   await page.fill("#vx", "0.2");
   assert.match((await page.textContent("#comparison")) ?? "", /was stopped/);
   await leave(opened);
@@ -364,7 +404,8 @@ test("nothing on the page moves by itself", async () => {
       new Promise<number>((resolve) => {
         let sum = 0;
         new PerformanceObserver((list) => {
-          for (const entry of list.getEntries()) sum += (entry as unknown as { value: number }).value;
+          for (const entry of list.getEntries())
+            sum += (entry as unknown as { value: number }).value;
         }).observe({ type: "layout-shift", buffered: true });
         setTimeout(() => resolve(sum), 500);
       }),
@@ -378,7 +419,9 @@ test("a browser without WebAssembly is told so", async () => {
     before: () => Reflect.deleteProperty(globalThis, "WebAssembly"),
     begins: false,
   });
-  await opened.page.waitForFunction(() => /WebAssembly/.test(document.getElementById("note")!.textContent!));
+  await opened.page.waitForFunction(() =>
+    /WebAssembly/.test(document.getElementById("note")!.textContent!),
+  );
   assert.match(await opened.note(), /^The page cannot begin: this browser has no WebAssembly/);
   await leave(opened, false);
 });
@@ -387,7 +430,9 @@ test("a file of the page that is missing is told of", async () => {
   const opened = await site.visit({ begins: false });
   await opened.page.route("**/page.json", (route) => route.fulfill({ status: 404, body: "" }));
   await opened.page.reload();
-  await opened.page.waitForFunction(() => /page\.json/.test(document.getElementById("note")!.textContent!));
+  await opened.page.waitForFunction(() =>
+    /page\.json/.test(document.getElementById("note")!.textContent!),
+  );
   assert.match(await opened.note(), /The page cannot begin: page\.json cannot be loaded \(404\)/);
   await opened.page.context().close();
 });

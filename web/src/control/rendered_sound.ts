@@ -4,7 +4,12 @@
  */
 
 import { LevelMeter } from "../sound/level_meter.js";
-import { FULL_SCALE, PROCESSOR, type ProcessorOptions, type ToProcessor } from "../sound/messages.js";
+import {
+  FULL_SCALE,
+  PROCESSOR,
+  type ProcessorOptions,
+  type ToProcessor,
+} from "../sound/messages.js";
 import { SETTLING } from "../sound/playback.js";
 import { READINGS_LENGTH } from "../sound/readings.js";
 import type { SoundTables } from "../sound/tables.js";

@@ -26,9 +26,13 @@ export function compile(mujoco: MainModule, mjcf: string, pictured: boolean): Mj
 
 /** Returns the index of something by its name. */
 export function idOf(mujoco: MainModule, model: MjModel, kind: Kind, name: string): number {
-  const type = { geom: mujoco.mjtObj.mjOBJ_GEOM, sensor: mujoco.mjtObj.mjOBJ_SENSOR,
-    site: mujoco.mjtObj.mjOBJ_SITE, actuator: mujoco.mjtObj.mjOBJ_ACTUATOR,
-    body: mujoco.mjtObj.mjOBJ_BODY }[kind];
+  const type = {
+    geom: mujoco.mjtObj.mjOBJ_GEOM,
+    sensor: mujoco.mjtObj.mjOBJ_SENSOR,
+    site: mujoco.mjtObj.mjOBJ_SITE,
+    actuator: mujoco.mjtObj.mjOBJ_ACTUATOR,
+    body: mujoco.mjtObj.mjOBJ_BODY,
+  }[kind];
   const id = mujoco.mj_name2id(model, type.value, name);
   if (id < 0) throw new Error(`the scene has no ${kind} ${name}`);
   return id;

@@ -87,7 +87,12 @@ export class ShadowSpot extends Mesh {
   constructor() {
     super(
       new CircleGeometry(0.3, 24).scale(1, 0.75, 1),
-      new MeshBasicMaterial({ color: 0x000000, transparent: true, opacity: 0.16, depthWrite: false }),
+      new MeshBasicMaterial({
+        color: 0x000000,
+        transparent: true,
+        opacity: 0.16,
+        depthWrite: false,
+      }),
     );
   }
 }
@@ -98,7 +103,12 @@ function tiles(): HTMLCanvasElement {
   canvas.width = canvas.height = 256;
   const context = canvas.getContext("2d");
   if (!context) return canvas;
-  for (const [column, row, shade] of [[0, 0, 255], [1, 0, 236], [0, 1, 236], [1, 1, 255]]) {
+  for (const [column, row, shade] of [
+    [0, 0, 255],
+    [1, 0, 236],
+    [0, 1, 236],
+    [1, 1, 255],
+  ]) {
     context.fillStyle = `rgb(${shade} ${shade} ${shade})`;
     context.fillRect(128 * column, 128 * row, 128, 128);
     context.strokeStyle = "rgb(190 190 190)";

@@ -52,12 +52,7 @@ function buildBody(mujoco: MainModule, model: MjModel, body: number, detail: num
   return group;
 }
 
-function shapeOf(
-  mujoco: MainModule,
-  model: MjModel,
-  geom: number,
-  detail: number,
-): BufferGeometry {
+function shapeOf(mujoco: MainModule, model: MjModel, geom: number, detail: number): BufferGeometry {
   const [a, b, c] = model.geom_size.subarray(3 * geom, 3 * geom + 3) as Float64Array;
   const kind = mujoco.mjtGeom;
   let shape: BufferGeometry;

@@ -77,7 +77,8 @@ function node(message: Uint8Array): OnnxNode {
     else if (field.number === 2) outputs.push(text(field.bytes));
     else if (field.number === 4) operator = text(field.bytes);
     else if (field.number === 5) attributes.set(...attribute(field.bytes));
-    else if (field.number === 7 && field.bytes.length) operator = `${text(field.bytes)}.${operator}`;
+    else if (field.number === 7 && field.bytes.length)
+      operator = `${text(field.bytes)}.${operator}`;
   }
   return { operator, inputs, outputs, attributes };
 }

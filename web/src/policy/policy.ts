@@ -183,7 +183,8 @@ class Metadata {
 
   observationNames(): (keyof Observation)[] {
     const names = this.text("observation_names").split(",");
-    for (const name of names) if (!(name in WIDTHS)) throw new RangeError(`it wants to see ${name}`);
+    for (const name of names)
+      if (!(name in WIDTHS)) throw new RangeError(`it wants to see ${name}`);
     return names as (keyof Observation)[];
   }
 

@@ -43,7 +43,10 @@ export function toAddress(settings: Settings): string {
  *
  * @returns The settings, and a line for each fault.
  */
-export function fromAddress(hash: string, page: PageData): { settings: Settings; faults: string[] } {
+export function fromAddress(
+  hash: string,
+  page: PageData,
+): { settings: Settings; faults: string[] } {
   const start = initialSettings(page);
   const faults: string[] = [];
   const fields = new URLSearchParams(hash.replace(/^#/, ""));
@@ -58,10 +61,18 @@ export function fromAddress(hash: string, page: PageData): { settings: Settings;
   const levels: readonly [number, number] = [0, page.stairs.risers.length - 1];
   const settings: Settings = {
     command,
-    floor: reader.word("floor", start.floor, page.floors.map(({ name }) => name)),
+    floor: reader.word(
+      "floor",
+      start.floor,
+      page.floors.map(({ name }) => name),
+    ),
     ground: reader.word("ground", start.ground, ["flat", "stairs"] as const),
     level: reader.number("level", start.level, levels, true),
-    controller: reader.word("controller", start.controller, page.controllers.map(({ name }) => name)),
+    controller: reader.word(
+      "controller",
+      start.controller,
+      page.controllers.map(({ name }) => name),
+    ),
   };
   return { settings, faults };
 }

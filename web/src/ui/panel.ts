@@ -30,18 +30,21 @@ export class Panel {
   private readonly trace = new Trace(canvas("trace"));
   private readonly note = anyElement("note");
 
-  constructor(page: PageData, actions: PanelActions) {
+  constructor(page: PageData) {
     const { trained, limits } = page.command;
     for (const axis of AXES) {
-      const slider = input(axis);
       const [low, high] = axis === "beta" ? limits.beta : trained[axis];
-      Object.assign(slider, { min: String(low), max: String(high) });
-      slider.addEventListener("input", () => actions.set(axis, Number(slider.value)));
+      Object.assign(input(axis), { min: String(low), max: String(high) });
     }
-    fill(select("floor"), page.floors.map(({ name }) => [name, name]));
+    fill(
+      select("floor"),
+      page.floors.map(({ name }) => [name, name]),
+    );
     fill(select("ground"), [["flat", "flat"], ...page.stairs.risers.map(stairsOption)]);
-    fill(select("controller"), page.controllers.map(({ name, label }) => [name, label]));
-    this.listen(actions);
+    fill(
+      select("controller"),
+      page.controllers.map(({ name, label }) => [name, label]),
+    );
   }
 
   /** Shows a command. */
@@ -114,7 +117,12 @@ export class Panel {
     loading.textContent = why;
   }
 
-  private listen(actions: PanelActions): void {
+  /** Begins to do what the controls ask for. */
+  listen(actions: PanelActions): void {
+    for (const axis of AXES) {
+      const slider = input(axis);
+      slider.addEventListener("input", () => actions.set(axis, Number(slider.value)));
+    }
     const clicks = {
       stop: actions.stopOrGo,
       push: actions.push,
