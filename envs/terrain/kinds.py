@@ -17,7 +17,7 @@ from .draws import CELLS, KEYS, along_line, in_square, units
 from .figures import FIGURES, LEVELS, TREAD
 from .layout import DEPTH, HALF_WIDTH, WIDE, Layout, boxes, join
 
-__all__ = ["KINDS", "Kind"]
+__all__ = ["KINDS", "Kind", "Stairs"]
 
 
 _UNITS = units(5, KEYS)
@@ -93,17 +93,17 @@ class Stairs(Kind):
     boxes = 7
     wide_boxes = 24
     max_heading = 0.25 * pi
-    _STEPS = 8
+    STEPS = 8
     """Steps of a flight."""
-    _TOP = 2.4
+    TOP = 2.4
     """Length of the upper landing, m."""
-    _VALLEY = 2.4
+    VALLEY = 2.4
     """Length of the lower landing, m; there no second hill is near."""
-    _PERIOD = _TOP + _VALLEY + 2 * (_STEPS - 1) * TREAD
+    PERIOD = TOP + VALLEY + 2 * (STEPS - 1) * TREAD
 
     def __init__(self, begins_on_top: bool) -> None:
         """Choose which way the first flight goes: robots begin on a landing's middle."""
-        self._shift = 0.0 if begins_on_top else 0.5 * self._PERIOD
+        self._shift = 0.0 if begins_on_top else 0.5 * self.PERIOD
         self._on_top = begins_on_top
 
     def height(self, xy: torch.Tensor, level: torch.Tensor, key: torch.Tensor) -> torch.Tensor:
@@ -112,7 +112,7 @@ class Stairs(Kind):
         away = (xy[..., 0] - self._middle(xy[..., 0])).abs()
         # Steps that reach as far from the middle of the hill; a step's edge belongs to it.
         steps = torch.floor((self._half(1) - away) / TREAD + 1.0 + 1e-6)
-        return riser * steps.clamp(0, self._STEPS) + self.base(level)[:, None]
+        return riser * steps.clamp(0, self.STEPS) + self.base(level)[:, None]
 
     def lay(
         self, xy: torch.Tensor, level: torch.Tensor, key: torch.Tensor, wide: bool = False
@@ -121,11 +121,11 @@ class Stairs(Kind):
         x = xy[:, :1]
         middle = self._middle(x)
         if wide:
-            middle = _around(middle, self._PERIOD).repeat_interleave(self._STEPS, dim=1)
-            step = torch.arange(1, self._STEPS + 1, device=xy.device).repeat(1, 3)
+            middle = _around(middle, self.PERIOD).repeat_interleave(self.STEPS, dim=1)
+            step = torch.arange(1, self.STEPS + 1, device=xy.device).repeat(1, 3)
         else:
             here = torch.floor((self._half(1) - (x - middle).abs()) / TREAD + 1.0)
-            lowest = (here - self.boxes // 2).clamp(1, self._STEPS - self.boxes + 1)
+            lowest = (here - self.boxes // 2).clamp(1, self.STEPS - self.boxes + 1)
             step = lowest + torch.arange(self.boxes, device=xy.device)
         half, base = self._half(step), self.base(level)[:, None]
         top = base + _figure("riser", level, xy)[:, None] * step
@@ -133,16 +133,16 @@ class Stairs(Kind):
 
     def base(self, level: torch.Tensor) -> torch.Tensor:
         """Return the height of the lower landing, m. Shape: (n,)."""
-        rise = self._STEPS * _figure("riser", level)
+        rise = self.STEPS * _figure("riser", level)
         return -rise if self._on_top else torch.zeros_like(rise)
 
     def _middle(self, x: torch.Tensor) -> torch.Tensor:
         """Return the middle of the hill that is nearest."""
-        return self._shift + self._PERIOD * torch.round((x - self._shift) / self._PERIOD)
+        return self._shift + self.PERIOD * torch.round((x - self._shift) / self.PERIOD)
 
     def _half(self, step: torch.Tensor | int) -> torch.Tensor | float:
         """Return half the length of a step's box, the first and longest of which is 1."""
-        return 0.5 * self._TOP + TREAD * (self._STEPS - step)
+        return 0.5 * self.TOP + TREAD * (self.STEPS - step)
 
 
 class Slopes(Kind):

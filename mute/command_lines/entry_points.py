@@ -29,6 +29,7 @@ __all__ = [
     "play",
     "release",
     "train",
+    "web",
 ]
 
 
@@ -72,6 +73,11 @@ def benchmark() -> NoReturn:
 def release() -> NoReturn:
     """Make the files of a policy that ships: `python -m mute.release`."""
     _start("release", keeps_files=True)
+
+
+def web() -> NoReturn:
+    """Write the assets of the page: `python -m mute.web`."""
+    _start("web", keeps_files=True)
 
 
 def card() -> NoReturn:

@@ -18,7 +18,7 @@ from places import REPOSITORY
 
 _PAGE = (REPOSITORY / "docs" / "commands.md").read_text()
 _PAGES = sorted([*REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").glob("*.md")])
-_NOT_OURS = (".ci/check_wheel.py", "-m venv ")
+_NOT_OURS = (".ci/check_wheel.py", "-m venv ", "-m http.server ")
 """What is run from the checkout, or is Python's own, and is no command of MUTE's."""
 _OF_THE_BENCHMARK = "-m mute.command_lines.benchmark_worker"
 """What another command starts, by its path, and nobody else."""
@@ -32,6 +32,7 @@ _MODULES = {
     "-m mute.benchmark": "mute.command_lines.benchmark",
     "-m mute.release": "mute.command_lines.release",
     "-m mute.card": "mute.command_lines.card",
+    "-m mute.web": "mute.command_lines.web",
     "-m benchmarks.levers": "benchmarks.levers",
     "-m benchmarks.mpc": "benchmarks.mpc",
     "-m benchmarks.make_peers": "benchmarks.make_peers",
@@ -122,7 +123,9 @@ def test_a_field_that_any_page_names_as_an_option_is_there(page):
 
 def test_the_page_has_every_module_that_can_be_run():
     modules = {
-        f"-m {'.'.join(path.relative_to(REPOSITORY).with_suffix('').parts)}"
+        f"-m {'.'.join(path.relative_to(REPOSITORY).with_suffix('').parts)}".removesuffix(
+            ".__main__"
+        )
         for path in (REPOSITORY / "mute").rglob("*.py")
         if 'if __name__ == "__main__":' in path.read_text()
     }

@@ -29,7 +29,16 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import root_scalar
 
-__all__ = ["Blow", "ContactLaw", "hertz_duration", "hertz_stiffness", "series_modulus"]
+__all__ = [
+    "YIELDS",
+    "Blow",
+    "BlowTable",
+    "ContactLaw",
+    "blow_table",
+    "hertz_duration",
+    "hertz_stiffness",
+    "series_modulus",
+]
 
 _STEPS = 3072
 """Steps of an integration, as many for each blow. Between them the force is constant: with a third
@@ -41,7 +50,7 @@ _FAINT = 1e-4
 """Share of its peak at which a force is over."""
 _SHAPE_POINTS = 1025
 """Points at which the impulse that has passed is kept."""
-_YIELDS = np.concatenate(([0.0], np.geomspace(1e-2, 10.0, 31)))
+YIELDS = np.concatenate(([0.0], np.geomspace(1e-2, 10.0, 31)))
 """Relative mobilities y of the table, from a rigid ground on; beyond its end, its end."""
 
 
@@ -116,11 +125,11 @@ class ContactLaw:
         )
         depth = self.depth(mass, speed)
         give = self.mobility * mass * speed / depth
-        table = _table(self.exponent, self.damping)
+        table = blow_table(self.exponent, self.damping)
         return Blow(
-            duration=np.interp(give, _YIELDS, table.duration) * depth / speed,
-            impulse=np.interp(give, _YIELDS, table.impulse) * mass * speed,
-            lost=np.interp(give, _YIELDS, table.lost) * 0.5 * mass * speed**2,
+            duration=np.interp(give, YIELDS, table.duration) * depth / speed,
+            impulse=np.interp(give, YIELDS, table.impulse) * mass * speed,
+            lost=np.interp(give, YIELDS, table.lost) * 0.5 * mass * speed**2,
             give=give,
         )
 
@@ -155,9 +164,9 @@ class ContactLaw:
 
     def _shapes(self, give: NDArray) -> NDArray[np.float64]:
         """Return the impulse that has passed at equal steps of each blow. Shape: (n, points)."""
-        table = _table(self.exponent, self.damping)
-        index = np.clip(np.searchsorted(_YIELDS, give, side="right") - 1, 0, len(_YIELDS) - 2)
-        share = (give - _YIELDS[index]) / (_YIELDS[index + 1] - _YIELDS[index])
+        table = blow_table(self.exponent, self.damping)
+        index = np.clip(np.searchsorted(YIELDS, give, side="right") - 1, 0, len(YIELDS) - 2)
+        share = (give - YIELDS[index]) / (YIELDS[index + 1] - YIELDS[index])
         share = np.clip(share, 0.0, 1.0)[:, None]
         return (1.0 - share) * table.passed[index] + share * table.passed[index + 1]
 
@@ -177,11 +186,17 @@ class Blow:
 
 
 @dataclass(frozen=True)
-class _Table:
+class BlowTable:
+    """Blows of one law on all grounds of `YIELDS`, in units of D, v and m. Shape: (yields, ...)."""
+
     duration: NDArray[np.float64]
+    """Time of contact, D / v."""
     impulse: NDArray[np.float64]
+    """Integral of the force, m v."""
     lost: NDArray[np.float64]
+    """Energy that is lost, m v^2 / 2."""
     passed: NDArray[np.float64]
+    """Share of the impulse that has passed at equal steps of the contact."""
 
 
 def _damping(restitution: float) -> float:
@@ -198,13 +213,13 @@ def _damping(restitution: float) -> float:
 
 
 @lru_cache(maxsize=64)
-def _table(exponent: float, damping: float) -> _Table:
-    """Integrate blows on all grounds of `_YIELDS` side by side, by Runge and Kutta's rule.
+def blow_table(exponent: float, damping: float) -> BlowTable:
+    """Integrate blows on all grounds of `YIELDS` side by side, by Runge and Kutta's rule.
 
     Time steps are each blow's own. Where the ground gives way like a dashpot, a body sinks into it
     for ever; a blow is over once its force has fallen to `_FAINT` of its peak.
     """
-    give = _YIELDS
+    give = YIELDS
     step = (_LONGEST[0] + _LONGEST[1] * give) / _STEPS
 
     def force(speed: NDArray, depth: NDArray) -> NDArray:
@@ -241,7 +256,7 @@ def _over(pressed: NDArray, depth: NDArray) -> float:
     return min(ends)
 
 
-def _summed_up(forces: NDArray, course: NDArray, step: NDArray) -> _Table:
+def _summed_up(forces: NDArray, course: NDArray, step: NDArray) -> BlowTable:
     """Return what blows came to, from their forces and (speeds, depths) at each step."""
     duration, left = np.empty(len(step)), np.empty(len(step))
     passed = np.empty((len(step), _SHAPE_POINTS))
@@ -254,4 +269,4 @@ def _summed_up(forces: NDArray, course: NDArray, step: NDArray) -> _Table:
         duration[blow], left[blow] = times[-1], course[last + 1, 0, blow]
         points = np.linspace(0.0, times[-1], _SHAPE_POINTS)
         passed[blow] = np.interp(points, times, so_far / so_far[-1])
-    return _Table(duration, 1.0 - left, 1.0 - left**2, passed)
+    return BlowTable(duration, 1.0 - left, 1.0 - left**2, passed)

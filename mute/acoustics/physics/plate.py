@@ -33,13 +33,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from mute.acoustics.air import AIR_DENSITY, AIR_IMPEDANCE, SPEED_OF_SOUND
 
-__all__ = ["Layer", "Plate", "bonded"]
+__all__ = ["UNDERLAY_LOSS", "Layer", "Plate", "bonded"]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 """Of the integral over a plate."""
 _ALL_LOST = 15.0
 """Exponent at which nothing is left of a wave's energy."""
-_UNDERLAY_LOSS = 0.2
+UNDERLAY_LOSS = 0.2
 """Loss factor of what a plate floats on (assumed: foams and fibres have 0.1 to 0.3)."""
 
 
@@ -109,7 +109,7 @@ class Plate:
     def _mass_left(self, frequency: ArrayLike) -> NDArray[np.complex128]:
         """Return z, the share of the plate's mass that its underlay leaves it. Any shape."""
         ratio = np.square(self.floating_frequency / np.asarray(frequency, dtype=np.float64))
-        return 1.0 - ratio * (1.0 + 1j * _UNDERLAY_LOSS)
+        return 1.0 - ratio * (1.0 + 1j * UNDERLAY_LOSS)
 
     @property
     def area(self) -> float:
@@ -139,7 +139,7 @@ class Plate:
         """
         frequency = np.asarray(frequency, dtype=np.float64)
         edges = self.edges / np.sqrt(frequency)
-        underlay = _UNDERLAY_LOSS * np.square(self.floating_frequency / frequency)
+        underlay = UNDERLAY_LOSS * np.square(self.floating_frequency / frequency)
         return self.loss + edges + underlay + 2.0 * self.radiation_loss(frequency)
 
     def radiation_loss(self, frequency: ArrayLike) -> NDArray[np.float64]:

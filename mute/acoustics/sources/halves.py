@@ -21,7 +21,7 @@ from mute.acoustics.sources.band_noise import filter_response
 from mute.acoustics.sources.pending import Pending
 from mute.acoustics.sources.response import PlateResponse, audible_end
 
-__all__ = ["Half", "LowPending", "halves", "low_divisor"]
+__all__ = ["TAPS", "Half", "LowPending", "halves", "interpolator", "low_divisor"]
 
 _FIRST_HIGH = 5
 """Index of the lowest octave of the upper half, 1 kHz."""
@@ -30,7 +30,7 @@ _LOW_RATE = 6000
 """Least sample rate of the lower half, Hz: its octaves end at 707 Hz, and what the beginning of a
 tone has above that falls off before half the rate."""
 
-_TAPS = 6
+TAPS = 6
 """Samples of the lower half that one of the sample rate is made of."""
 
 _FADE = 0.005
@@ -45,10 +45,10 @@ def low_divisor(sample_rate: int) -> int:
     return max(1, sample_rate // _LOW_RATE)
 
 
-def _interpolator(divisor: int) -> NDArray[np.float64]:
+def interpolator(divisor: int) -> NDArray[np.float64]:
     """Return the filter between samples of the lower half, of unit sum for each phase."""
     cutoff = min(2.0 * _PASSED[1], 1.0) / divisor
-    return np.asarray(firwin(_TAPS * divisor, cutoff)) * divisor
+    return np.asarray(firwin(TAPS * divisor, cutoff)) * divisor
 
 
 class Half:
@@ -68,7 +68,7 @@ class Half:
         self.rate = sample_rate / self.divisor
         """Samples a second, Hz."""
         # Of the filter between samples, and of forces, which are means over the time before each.
-        late = (_TAPS + 1) * self.divisor - 2 if low else 0
+        late = (TAPS + 1) * self.divisor - 2 if low else 0
         self.late = 0.5 * late / sample_rate
         """By how much later its sound comes than it is given, s: 0.6 ms at 48 kHz, 0.2 m."""
         self.low = low
@@ -150,7 +150,7 @@ class Half:
             return np.ones(len(frequency))
         begin, end = (share * self.rate for share in _PASSED)
         falling = np.clip((end - frequency) / (end - begin), 0.0, 1.0)
-        taps = _interpolator(self.divisor)
+        taps = interpolator(self.divisor)
         turn = 2.0 * np.pi * frequency / (self.rate * self.divisor)
         between = filter_response(taps / self.divisor, np.ones(1), turn)
         # Means over samples, and the filter between them, are even only where it is low.
@@ -180,9 +180,9 @@ class LowPending:
         self._divisor = divisor
         self._pending = Pending(num_robots)
         # One more than the next sample needs: the last one may not be heard to its end.
-        self._last = np.zeros((num_robots, _TAPS))
+        self._last = np.zeros((num_robots, TAPS))
         # Of each phase, for the oldest sample first.
-        self._between = _interpolator(divisor).reshape(_TAPS, divisor)[::-1]
+        self._between = interpolator(divisor).reshape(TAPS, divisor)[::-1]
         self._next: int | None = None
 
     def begin(self, first: int) -> None:
@@ -209,9 +209,9 @@ class LowPending:
         frames = -(-stop // self._divisor)
         known = np.concatenate((self._last, self._pending.take(frames - self._next)), axis=1)
         self._next = frames
-        self._last = known[:, known.shape[1] - _TAPS :]
+        self._last = known[:, known.shape[1] - TAPS :]
         begin = first // self._divisor
-        used = known[:, known.shape[1] - (frames - begin) - (_TAPS - 1) :]
-        near = np.lib.stride_tricks.sliding_window_view(used, _TAPS, axis=1)
+        used = known[:, known.shape[1] - (frames - begin) - (TAPS - 1) :]
+        near = np.lib.stride_tricks.sliding_window_view(used, TAPS, axis=1)
         sound = (near @ self._between).reshape(len(used), -1)
         return sound[:, first - begin * self._divisor :][:, : stop - first]

@@ -24,7 +24,7 @@ from mute.acoustics.sources.pending import Pending
 from mute.acoustics.sources.response import LONGEST_PULSE, PLACES, floor_response
 from mute.acoustics.sources.shell import SIDES, shell_response
 
-__all__ = ["LandingSound", "place_struck", "sampled_force"]
+__all__ = ["FAINTEST", "PLACE_SIZE", "LandingSound", "place_struck", "sampled_force"]
 
 _AT_ONCE = 64
 """Blows that are worked out side by side, which bounds the memory."""
@@ -32,16 +32,16 @@ _AT_ONCE = 64
 _PULSES = (0.03, LONGEST_PULSE)
 """Lengths of transforms for the forces of short and of long blows, s."""
 
-_PLACE_SIZE = 0.2
+PLACE_SIZE = 0.2
 """Length of the squares within which a floor sounds alike, m (chosen)."""
 
-_FAINTEST = 1e-3
+FAINTEST = 1e-3
 """Speed below which a landing is not heard, m/s."""
 
 
 def place_struck(position: NDArray) -> NDArray[np.int64]:
     """Return which of a floor's places a blow hits. Shape: (n,) of (n, 3), m."""
-    square = np.floor(position[:, :2] / _PLACE_SIZE).astype(np.int64)
+    square = np.floor(position[:, :2] / PLACE_SIZE).astype(np.int64)
     return (square[:, 0] * 73856093 ^ square[:, 1] * 19349663) % PLACES
 
 
@@ -116,7 +116,7 @@ class LandingSound:
         where = microphone[step, block.impacts.robot]
         trunk = block.trunk_pos[step, block.impacts.robot]
         for index, floor in enumerate(self._floors):
-            here = (block.impacts.floor == index) & (block.impacts.speed > _FAINTEST)
+            here = (block.impacts.floor == index) & (block.impacts.speed > FAINTEST)
             for some, pulse in _batches(floor, block.impacts, np.flatnonzero(here)):
                 blows = block.impacts.select(some)
                 self._strike(index, blows, pulse, where[some], trunk[some], first)

@@ -13,7 +13,14 @@ from scipy.fft import next_fast_len
 from mute.acoustics.physics.plate import Plate
 from mute.acoustics.physics.ringing import OCTAVES, ringing_responses
 
-__all__ = ["LONGEST_PULSE", "PLACES", "PlateResponse", "audible_end", "floor_response"]
+__all__ = [
+    "LONGEST_PULSE",
+    "PLACES",
+    "PlateResponse",
+    "audible_end",
+    "floor_response",
+    "modes_seed",
+]
 
 PLACES = 12
 """Places of a plate that sound different when they are struck."""
@@ -32,6 +39,11 @@ def audible_end(impulses: NDArray, gone: float = 1e-8) -> int:
     """
     left = np.square(impulses)[:, ::-1].cumsum(axis=1)[:, ::-1]
     return int((left > gone * left[:, :1]).any(axis=0).sum())
+
+
+def modes_seed(plate: Plate) -> int:
+    """Return the seed of a plate's modes: the same plate is always the same."""
+    return round(1e6 * (plate.surface_mass + plate.critical_frequency))
 
 
 def _above(corner: float, frequency: NDArray) -> NDArray[np.complex128]:
@@ -55,7 +67,7 @@ class PlateResponse:
                 all of it (`Plate.spread`), or it is small, and all sound goes as from a point.
             panels: Number of such plates that share the sound, each with modes of its own.
         """
-        seed = round(1e6 * (plate.surface_mass + plate.critical_frequency))
+        seed = modes_seed(plate)
         # A shell is small: of the few modes of a band none may be struck at one place alone.
         ringing = ringing_responses(
             plate, sample_rate, PLACES, seed, even=form == "body", panels=panels

@@ -18,6 +18,7 @@ PROGRAMS = {
     "mute.benchmark": "--rollouts",
     "mute.card": "--noise",
     "mute.release": "--checkpoint",
+    "mute.web": "--reference",
 }
 """Modules for `python -m`, and an option of each."""
 

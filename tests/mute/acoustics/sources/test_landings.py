@@ -99,11 +99,11 @@ def test_a_force_has_no_steps_that_are_heard(monkeypatch):
 
     usual = heard()
     monkeypatch.setattr(contact, "_STEPS", 2 * contact._STEPS)
-    contact._table.cache_clear()
+    contact.blow_table.cache_clear()
     try:
         np.testing.assert_allclose(usual, heard(), atol=0.3)
     finally:
-        contact._table.cache_clear()
+        contact.blow_table.cache_clear()
 
 
 def test_a_harder_blow_is_shorter_as_hertz_says():

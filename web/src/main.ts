@@ -1,0 +1,63 @@
+/** Begins the page, and says plainly what is missing. */
+
+import { App } from "./app.js";
+import { makeConsole } from "./console.js";
+import { fetchFile, fileOf, load, loadBytes, type Loaded } from "./load.js";
+import { Simulation } from "./physics/simulation.js";
+import { Picture } from "./picture/picture.js";
+import { PolicyShelf } from "./policy/shelf.js";
+import { hearingStarter, soundFiles } from "./sound_files.js";
+import { anyElement, canvas } from "./ui/elements.js";
+import { Panel } from "./ui/panel.js";
+
+const NO_SOUND =
+  "There is no sound in this browser, or not here: audio worklets need https or localhost.";
+
+async function begin(): Promise<void> {
+  const loaded = await load();
+  const { page, mujoco, scenes, settings, faults } = loaded;
+  const simulation = new Simulation(mujoco, scenes, page);
+  const shelf = makeShelf(loaded, simulation.timestep);
+  const sound = soundFiles(fetchFile);
+  const startHearing = hearingStarter(sound, simulation.timestep);
+  const [picture, why] = makePicture(() => new Picture(canvas("view"), mujoco, scenes.flat));
+  const first = await shelf.get(settings.controller);
+  const panel = new Panel(page);
+  const app = new App({ page, simulation, shelf, first, settings, picture, panel, startHearing });
+  panel.ready(why);
+  if (faults.length) app.tellFaults(faults);
+  else panel.tell(startHearing ? welcome(settings.floor) : NO_SOUND);
+  app.run();
+  performance.mark("interactive");
+  globalThis.mute = makeConsole(app, loaded, sound);
+}
+
+/** Returns the page's policies, of which the first to drive is loaded already. */
+function makeShelf({ page, settings, file }: Loaded, timestep: number): PolicyShelf {
+  const robot = { jointNames: page.joint_names, timestep };
+  const first = fileOf(page.controllers, settings.controller);
+  return new PolicyShelf(page.controllers, robot, async (name) =>
+    name === first ? file : loadBytes(name),
+  );
+}
+
+/** Returns the picture, or why there is none: the robot can be steered and heard without. */
+function makePicture(make: () => Picture): [Picture | null, string] {
+  try {
+    return [make(), ""];
+  } catch {
+    return [null, "This browser shows no 3D pictures (WebGL is missing). The robot walks unseen."];
+  }
+}
+
+function welcome(floor: string): string {
+  return `It walks on ${floor}. Turn β, drive with the keys, and switch the sound on.`;
+}
+
+begin().catch((error: unknown) => {
+  const line = error instanceof Error ? error.message : String(error);
+  const loading = anyElement("loading");
+  loading.hidden = false;
+  loading.textContent = `The page cannot begin: ${line}.`;
+  anyElement("note").textContent = loading.textContent;
+});

@@ -1,0 +1,157 @@
+/** Steering, the clock, addresses and stairs: what each does alone. */
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { Clock } from "../src/control/clock.js";
+import { Comparison } from "../src/control/comparison.js";
+import { Rate } from "../src/control/rates.js";
+import { Steering } from "../src/control/steering.js";
+import { withoutSlack } from "../src/input/joystick.js";
+import { Stairs } from "../src/physics/stairs.js";
+import { PixelBudget } from "../src/picture/pixel_budget.js";
+import { fromAddress, initialSettings, toAddress } from "../src/settings/settings.js";
+import { page } from "./files.js";
+
+const steering = () => new Steering(page.command.start, page.command.limits);
+
+test("ten steps up and ten down come back to exactly nothing, which asks to stand", () => {
+  const robot = steering();
+  robot.set({ vx: 0 });
+  for (let i = 0; i < 10; i++) robot.change("vx", 0.1);
+  assert.equal(robot.command.vx, 1);
+  for (let i = 0; i < 10; i++) robot.change("vx", -0.1);
+  assert.ok(robot.stands);
+});
+
+test("commands end at their limits", () => {
+  const robot = steering();
+  robot.set({ vx: 50, beta: -3 });
+  assert.deepEqual([robot.command.vx, robot.command.beta], [2, 0]);
+});
+
+test("who was stopped goes on as before, at the beta of now", () => {
+  const robot = steering();
+  robot.set({ vx: 0.7, wz: 0.2 });
+  robot.stopOrGo();
+  robot.set({ beta: 1 });
+  robot.stopOrGo();
+  assert.deepEqual(robot.command, { vx: 0.7, vy: 0, wz: 0.2, beta: 1 });
+});
+
+test("the clock has a step due for each period, whatever the rate of looks", () => {
+  for (const look of [0.004, 0.016, 0.033]) {
+    const clock = new Clock();
+    let due = 0;
+    const looks = Math.round(10 / look);
+    for (let i = 0; i <= looks; i++) due += clock.tick(i * look, 0.02);
+    assert.ok(Math.abs(due - (looks * look) / 0.02) <= 1, `${due} steps at looks of ${look} s`);
+  }
+});
+
+test("a late clock catches up a tenth of a second, and no more", () => {
+  const clock = new Clock();
+  clock.tick(0, 0.02);
+  assert.equal(clock.tick(0.08, 0.02), 4);
+  assert.ok(clock.tick(1.5, 0.02) <= 6);
+  assert.equal(clock.tick(60, 0.02), 0);
+});
+
+test("pictures lie between control steps", () => {
+  const clock = new Clock();
+  clock.tick(0, 0.02);
+  clock.tick(0.03, 0.02);
+  assert.ok(Math.abs(clock.share(0.035, 0.02) - 0.75) < 1e-9);
+  assert.equal(clock.share(9, 0.02), 1);
+});
+
+test("a rate is of the last two seconds", () => {
+  const rate = new Rate();
+  for (let i = 0; i <= 100; i++) rate.add(0.1 * i, i < 50 ? 1 : 5);
+  assert.ok(Math.abs(rate.perSecond - 50) < 1);
+});
+
+test("an address comes back as it was written", () => {
+  const settings = {
+    ...initialSettings(page),
+    command: { vx: -0.35, vy: 0.1, wz: 0, beta: 0.9 },
+    ground: "stairs" as const,
+    level: 3,
+    floor: "tile",
+  };
+  assert.deepEqual(fromAddress(toAddress(settings), page), { settings, faults: [] });
+});
+
+test("an empty address is no fault, and every damaged part of another is", () => {
+  assert.deepEqual(fromAddress("", page), { settings: initialSettings(page), faults: [] });
+  const damaged = "#vx=Infinity&beta=&vy=9&level=1.5&floor=&ground=moon&controller=x&a=1&%";
+  const { settings, faults } = fromAddress(damaged, page);
+  assert.deepEqual(settings, initialSettings(page));
+  assert.equal(faults.length, 9);
+  for (const fault of faults) assert.ok(!fault.includes("\n") && fault.length < 160, fault);
+});
+
+test("no sort of garbage in an address throws or gets past the limits", () => {
+  let seed = 1;
+  const random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
+  for (let i = 0; i < 2000; i++) {
+    const letters = Array.from({ length: 30 }, () => String.fromCharCode(32 + 95 * random()));
+    const { command } = fromAddress(`#vx=${letters.join("")}&wz=${1e3 * random()}`, page).settings;
+    assert.ok(Math.abs(command.vx) <= 2 && Math.abs(command.wz) <= 2);
+  }
+});
+
+test("a stick has slack in the middle and its full reach at the ends", () => {
+  assert.deepEqual([0.05, -0.12, 1, -1, 2].map(withoutSlack), [0, 0, 1, -1, 1]);
+  assert.ok(withoutSlack(0.5) > 0.4 && withoutSlack(0.5) < 0.5);
+});
+
+test("the boxes of stairs have their tops at the height that is told", () => {
+  for (const level of [0, 4]) {
+    const stairs = new Stairs(page.stairs, level);
+    for (let x = -9; x < 9; x += 0.037) {
+      const over = [...stairs.near(x, 0.3)].filter(
+        ({ centre, half }) => Math.abs(x - centre[0]) < half[0],
+      );
+      const top = Math.max(0, ...over.map(({ centre, half }) => centre[2] + half[2]));
+      assert.ok(
+        Math.abs(top - stairs.height(x)) < 1e-9,
+        `at ${x}: ${top}, told ${stairs.height(x)}`,
+      );
+    }
+    assert.equal(stairs.height(0), 0);
+  }
+});
+
+test("a machine that draws slowly is given less to draw, one that keeps up is not", () => {
+  const slow = new PixelBudget(false);
+  const shares = [slow.ratio(1)];
+  for (let i = 0; i < 200; i++) if (slow.after(0.1)) shares.push(slow.ratio(1));
+  assert.deepEqual(
+    shares,
+    [...shares].sort((a, b) => b - a),
+  );
+  assert.ok(slow.ratio(1) < 0.5 && !slow.shadows);
+  const quick = new PixelBudget(false);
+  for (let i = 0; i < 200; i++) assert.equal(quick.after(1 / 60), false);
+  assert.ok(quick.shadows);
+});
+
+test("a comparison walks at both betas for as long, and tells the difference", () => {
+  const told: string[] = [];
+  const begun: number[] = [];
+  let ended = 0;
+  const comparison = new Comparison({
+    begin: (beta) => begun.push(beta),
+    tell: (text) => told.push(text),
+    end: () => ended++,
+  });
+  comparison.start();
+  for (let step = 0; step <= 575; step++) comparison.follow(0.02 * step, 67.4);
+  assert.deepEqual(begun, [0, 1]);
+  comparison.follow(11.6, NaN); // nothing is heard of it yet
+  assert.ok(comparison.isRunning);
+  comparison.follow(11.7, 63.1);
+  assert.equal(told[told.length - 1], "β 0: 67.4 dBA. β 1: 63.1 dBA. 4.3 dB quieter at β 1.");
+  assert.deepEqual([ended, comparison.isRunning], [1, false]);
+});

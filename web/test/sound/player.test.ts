@@ -1,0 +1,124 @@
+/** The page's end of the sound and the audio thread's, wired together without a browser. */
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { FULL_SCALE, type FromProcessor, PROCESSOR, type ToProcessor } from "../../src/sound/messages";
+import { Player, startPlayer } from "../../src/sound/player";
+import { Playback } from "../../src/sound/playback";
+import { READINGS_LENGTH } from "../../src/sound/readings";
+import { readReferences, readTables, readWalk } from "./walks";
+
+const references = readReferences();
+const tables = readTables();
+const walk = readWalk("wood-0", references);
+
+/** One end of a channel, which delivers when it is told to. */
+class Port<Out> {
+  onmessage: ((event: { data: unknown }) => void) | null = null;
+  readonly sent: Out[] = [];
+  postMessage(message: Out): void {
+    this.sent.push(message);
+  }
+}
+
+interface Processor {
+  readonly port: Port<FromProcessor>;
+  process(inputs: Float32Array[][], outputs: Float32Array[][]): boolean;
+}
+
+/** Returns the audio thread's end, as its scope would make it. */
+async function makeProcessor(): Promise<Processor> {
+  let made: (new (options: object) => Processor) | undefined;
+  Object.assign(globalThis, {
+    sampleRate: 48000,
+    AudioWorkletProcessor: class {
+      readonly port = new Port<FromProcessor>();
+    },
+    registerProcessor(name: string, own: typeof made) {
+      assert.equal(name, PROCESSOR);
+      made = own;
+    },
+  });
+  await import("../../src/sound/worklet");
+  assert.ok(made, "nothing was registered");
+  return new made({ processorOptions: { tables, soundscape: { surface: "wood" } } });
+}
+
+function steps(first: number, count: number): Float32Array {
+  return walk.slice(first * READINGS_LENGTH, (first + count) * READINGS_LENGTH);
+}
+
+test("what the player is fed is played in shares of the full scale, and its levels are told", async () => {
+  const processor = await makeProcessor();
+  const port = new Port<ToProcessor>();
+  const told: FromProcessor[] = [];
+  const player = new Player({} as AudioContext, { port } as unknown as AudioWorkletNode, {} as GainNode);
+  player.onLevels = (levels) => told.push(levels as FromProcessor);
+  /** Delivers what either end has sent. */
+  const deliver = () => {
+    for (const data of port.sent.splice(0)) processor.port.onmessage?.({ data });
+    for (const data of processor.port.sent.splice(0)) port.onmessage?.({ data });
+  };
+  const playback = new Playback(tables, { surface: "wood", sampleRate: 48000 });
+  const stereo = [new Float32Array(128), new Float32Array(128)] as const;
+  const wanted = new Float32Array(128);
+  const play = (first: number) => {
+    for (let step = first; step < first + 2000; step += 20) {
+      player.feed(steps(step, 20));
+      playback.feed(steps(step, 20));
+      deliver();
+      for (let block = 0; block < 7; block++) {
+        assert.ok(processor.process([], [[...stereo]]));
+        playback.play(wanted);
+        wanted.forEach((own, i) => assert.equal(stereo[1][i], Math.fround(own / FULL_SCALE)));
+        assert.deepEqual(stereo[0], stereo[1]);
+      }
+    }
+  };
+  play(0);
+  assert.ok(told.length > 20, `told ${told.length} times`);
+  const last = told.at(-1) as FromProcessor;
+  assert.ok(last.level > 55 && last.mnl > 55 && last.pnl >= last.mnl && last.seconds > 0.1);
+
+  // Levels on their way while the walk begins anew are of the walk before, and are not told.
+  processor.port.postMessage(last);
+  const before = told.length;
+  player.reset();
+  deliver();
+  assert.equal(told.length, before);
+  playback.reset();
+  player.setSurface("carpet");
+  playback.setSurface("carpet");
+  play(0);
+  const anew = told.slice(before);
+  assert.ok(anew.length > 20 && anew.every((levels) => levels.walk === 1));
+  assert.ok(Number.isNaN(anew[0]?.mnl));
+});
+
+test("a part of an array is copied, and a whole one given away", () => {
+  const given: ArrayBuffer[] = [];
+  const port = {
+    postMessage: (_: ToProcessor, transfer: ArrayBuffer[]) => given.push(...transfer),
+  };
+  const player = new Player({} as AudioContext, { port } as unknown as AudioWorkletNode, {} as GainNode);
+  const whole = steps(0, 2);
+  player.feed(whole);
+  player.feed(whole.subarray(0, READINGS_LENGTH));
+  assert.equal(given[0], whole.buffer);
+  assert.notEqual(given[1], whole.buffer);
+  assert.equal(given[1]?.byteLength, 4 * READINGS_LENGTH);
+});
+
+test("a browser without Web Audio, or where it is not safe, is told of in a line", async () => {
+  await assert.rejects(startPlayer(tables, "worklet.js", { surface: "wood" }), /no Web Audio/);
+  let closed = false;
+  Object.assign(globalThis, {
+    AudioContext: class {
+      async close(): Promise<void> {
+        closed = true;
+      }
+    },
+  });
+  await assert.rejects(startPlayer(tables, "worklet.js", { surface: "wood" }), /https or localhost/);
+  assert.ok(closed, "the context is left open");
+});
