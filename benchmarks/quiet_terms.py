@@ -91,7 +91,8 @@ def costs(policy: Policy, robots: int, seconds: float, seed: int) -> list[dict[s
     scene = dataclasses.replace(cfg.scene, foot_forces=True)
     rewards = dataclasses.replace(cfg.rewards, terms=terms)
     env = QuadrupedEnv(dataclasses.replace(cfg, scene=scene, rewards=rewards))
-    env.set_command(torch.tensor((_SPEED, 0.0, 0.0, 0.0)))
+    command = torch.tensor((_SPEED, 0.0, 0.0, 0.0))
+    env.set_command(command)
     controller = LearnedController(policy, robots)
     sums, landings = dict.fromkeys(terms, 0.0), [torch.zeros(0)]
     for _ in range(round(seconds / env.step_dt)):
@@ -101,7 +102,7 @@ def costs(policy: Policy, robots: int, seconds: float, seed: int) -> list[dict[s
             sums[name] -= float(extras["log"][f"Reward/{name}"])
         if bool(dones.any()):
             controller.reset(dones)
-            env.set_command(torch.tensor((_SPEED, 0.0, 0.0, 0.0)))
+            env.set_command(command)
     speeds = torch.cat(landings)
     # Sums of what all robots pay on the mean, per second, over control steps.
     each = robots / len(speeds) * _SPEED**2 / float(speeds.square().mean())

@@ -77,7 +77,6 @@ class Footfalls:
         self._depth = (self.min_steps + math.ceil(self._window / decimation)) * decimation
         shape = (num_envs, _NUM_FEET)
         self._drop = torch.zeros(self._depth, *shape, device=device)
-        self._raise = torch.zeros(decimation, *shape, device=device)
         self._touch = torch.zeros(self._depth, *shape, dtype=torch.bool, device=device)
         self._step = torch.arange(self._depth, dtype=torch.float32, device=device)[:, None, None]
         self._countdown = self._depth - self._step
@@ -140,7 +139,6 @@ class Footfalls:
         self._drop[:keep] = self._drop[self._decimation :].clone()
         self._touch[:keep] = self._touch[self._decimation :].clone()
         torch.clamp(-foot_vel_z, min=0.0, out=self._drop[keep:])
-        torch.clamp(foot_vel_z, min=0.0, out=self._raise)
         torch.gt(found, 0.0, out=self._touch[keep:])
         self.vel_z = torch.cat((self.vel_z[-1:], foot_vel_z))
 
@@ -153,7 +151,7 @@ class Footfalls:
         """
         recent = slice(self._depth - self._decimation, self._depth)
         self.drop_sq = self._drop[recent].square().mean(dim=0)
-        self.raise_sq = self._raise.square().mean(dim=0)
+        self.raise_sq = self.vel_z[1:].clamp(min=0.0).square().mean(dim=0)
         touch = self._touch[recent]
         self.contact_share = touch.float().mean(dim=0)
         self.raw_contact = touch.any(dim=0)
@@ -179,7 +177,6 @@ class Footfalls:
         column = mask.unsqueeze(1)
         self._contacts.reset(mask, raw)
         self._drop.masked_fill_(column, 0.0)
-        self._raise.masked_fill_(column, 0.0)
         self.vel_z = self.vel_z.masked_fill(column, 0.0)
         torch.where(column, raw, self._touch, out=self._touch)
         self.raw_contact = torch.where(column, raw, self.raw_contact)

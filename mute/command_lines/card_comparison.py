@@ -83,8 +83,7 @@ def _verdicts_table(told: Sequence[Any]) -> str:
 
 
 def _levels_text(found: Mapping[str, Any]) -> str:
-    trainings = (len(row.trainings) for row in _table_levels(found["levels"]))
-    several = max(trainings, default=1) > 1
+    several = any(len(one.trainings) > 1 for one in _table_levels(found["levels"]))
     over = (
         " Of several trainings it is the mean, and their smallest and largest are in brackets."
         if several

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
-import json
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -34,7 +32,7 @@ from mute.evaluation.tables import print_table, read_json, write_csv, write_json
 from mute.support.errors import MuteError
 from mute.support.files import write_file
 from mute.support.plain_data import without_nan
-from mute.support.provenance import file_sha256
+from mute.support.provenance import digest_of, file_sha256
 from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK
@@ -206,8 +204,7 @@ def _walked(args: PaperArgs, origin: Mapping[str, str]) -> Path:
         "trials": trials,
     }
     del asked["policy"]  # wherever the same file lies
-    digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
-    folder = args.out / "walks" / digest[:16]
+    folder = args.out / "walks" / digest_of(asked)
     done = folder / "done"  # what is there without was stopped
     if not done.is_file():
         walk(

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import platform
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import torch
 
@@ -12,7 +15,7 @@ from mute.support.errors import MuteError
 from mute.support.quiet_git import import_git
 from mute.support.threads import usable_cores
 
-__all__ = ["REPOSITORY", "current_commit", "file_sha256", "machine_kind"]
+__all__ = ["REPOSITORY", "current_commit", "digest_of", "file_sha256", "machine_kind"]
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 """Top of the checkout; of an installed package, the directory that it is in."""
@@ -44,6 +47,12 @@ def file_sha256(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
         raise MuteError(f"cannot read {path}: {error.strerror}") from error
+
+
+def digest_of(data: Mapping[str, Any]) -> str:
+    """Return sixteen hexadecimal digits that name plain data, whatever the order of its keys."""
+    text = json.dumps(data, sort_keys=True).encode()
+    return hashlib.sha256(text).hexdigest()[:16]
 
 
 def machine_kind() -> str:

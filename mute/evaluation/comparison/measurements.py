@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import itertools
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +12,7 @@ from typing import Any
 from mute.evaluation.comparison.walkers import MUTE, Walker
 from mute.evaluation.noise_levels import SETTLE_TIME, NoiseSetting, measure_noise
 from mute.evaluation.tables import read_json, write_json
+from mute.support.provenance import digest_of
 
 __all__ = ["FLOORS_COMPARED", "FULL", "QUICK", "Extent", "Job", "Kept", "jobs", "measure"]
 
@@ -192,5 +191,4 @@ class Kept:
         write_json(self._path(asked), {"asked": asked, "rows": list(rows)})
 
     def _path(self, asked: Mapping[str, Any]) -> Path:
-        text = json.dumps(asked, sort_keys=True).encode()
-        return self._folder / f"{hashlib.sha256(text).hexdigest()[:16]}.json"
+        return self._folder / f"{digest_of(asked)}.json"

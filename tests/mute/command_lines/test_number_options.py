@@ -24,6 +24,7 @@ _COMMANDS = {
     "evaluate sweep-beta": ("evaluate_noise", "SweepBetaArgs"),
     "evaluate walk": ("evaluate_walk", "WalkArgs"),
     "evaluate terrain": ("evaluate_terrain", "TerrainArgs"),
+    "evaluate paper": ("evaluate_paper", "PaperArgs"),
     "evaluate reliability": ("evaluate_reliability", "ReliabilityArgs"),
     "benchmark": ("benchmark", "BenchmarkArgs"),
     "meter": ("meter", "MeterArgs"),
