@@ -16,7 +16,7 @@ from .figures import TREAD
 from .kinds import KINDS, Kind
 from .layout import Layout
 
-__all__ = ["BoxGround", "FlatGround", "Ground", "num_boxes"]
+__all__ = ["NEAR", "BoxGround", "FlatGround", "Ground", "num_boxes"]
 
 
 def num_boxes(kinds: Iterable[str], drawn: bool = False) -> int:
@@ -32,7 +32,7 @@ class Below(NamedTuple):
     feet: torch.Tensor
     """Under each foot. Shape: (num_envs, feet)."""
     near_feet: torch.Tensor
-    """The highest within `_NEAR` of each foot, which it may meet soon. Shape: (num_envs, feet)."""
+    """The highest within `NEAR` of each foot, which it may meet soon. Shape: (num_envs, feet)."""
     trunk: torch.Tensor
     """Under the trunk. Shape: (num_envs,)."""
 
@@ -78,7 +78,7 @@ class Ground(ABC):
             trunk: Likewise. Shape: (num_envs, 2).
         """
         count = feet.shape[1]
-        around = _corners(feet, _NEAR)
+        around = _corners(feet, NEAR)
         # To look up twenty heights takes hardly longer than one.
         points = torch.cat((feet, trunk[:, None], around.flatten(1, 2)), dim=1)
         heights = self.height(points)
@@ -119,7 +119,7 @@ def _corners(centres: torch.Tensor, radius: float) -> torch.Tensor:
     return centres[:, :, None] + radius * centres.new_tensor(signs)
 
 
-_NEAR = 0.12
+NEAR = 0.12
 """How far from a foot ground counts as near, m: less than half a tread, as far as a foot at 1 m/s
 gets in what is left of a swing from its middle on."""
 

@@ -18,14 +18,14 @@ from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.scene import FOOT_RADIUS, LEGS
 from mute.envs.sensors import sensor_slice
 
-__all__ = ["Recorder", "effective_mass"]
+__all__ = ["AT_LIMIT", "RELEASE", "Recorder", "effective_mass"]
 
-_RELEASE = 0.005
+RELEASE = 0.005
 """Time without contact after which the next contact is an impact, s (chosen). The solver may drop a
 contact that carries little load for a step or two; a foot that is off the ground that shortly
 cannot have gathered speed."""
 
-_AT_LIMIT = 0.99
+AT_LIMIT = 0.99
 """Share of the largest friction from which on a foot slides. With an elliptic cone the solver puts
 the force of a sliding foot exactly on the cone."""
 
@@ -75,7 +75,7 @@ class Recorder:
         self._robots = robots or slice(None)
         self._rows: dict[str, list[NDArray[np.float32]]] = {name: [] for name in _RECORDED}
         self._recorded = 0
-        self._release = max(1, round(_RELEASE / self.timestep))
+        self._release = max(1, round(RELEASE / self.timestep))
         self._last_qpos = env.simulation.qpos.numpy()[self._robots].copy()
         self._friction = _friction(env, floor_at)[self._robots]
         # All begin on the ground: the first contact is no impact.
@@ -289,5 +289,5 @@ def _friction_power(
     slide_x, slide_y = x - turn_y * FOOT_RADIUS, y + turn_x * FOOT_RADIUS
     force = vectors["force"]
     power = np.maximum(force[..., 0] * slide_x + force[..., 1] * slide_y, 0.0)
-    slides = np.hypot(force[..., 0], force[..., 1]) >= _AT_LIMIT * limit
+    slides = np.hypot(force[..., 0], force[..., 1]) >= AT_LIMIT * limit
     return np.where(slides, power, 0.0)

@@ -15,6 +15,7 @@ from typing import Any
 
 from mute.acoustics.audible_env import listening_cfg
 from mute.acoustics.floors import FLOORS
+from mute.acoustics.recorder import AT_LIMIT, RELEASE
 from mute.controllers.command import COMMAND_LIMITS, Command
 from mute.controllers.learned import Policy
 from mute.controllers.onnx_export import export_policy
@@ -23,16 +24,18 @@ from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.scene import FOOT_RADIUS, JOINT_NAMES, LEGS, SceneCfg
 from mute.envs.simulation import MAX_SPEED
 from mute.envs.terrain.figures import FIGURES, TREAD
+from mute.envs.terrain.ground import NEAR
 from mute.envs.terrain.kinds import Stairs
 from mute.envs.terrain.layout import DEPTH, HALF_WIDTH, WIDE
+from mute.evaluation.noise_levels import SETTLE_TIME
 from mute.evaluation.trials import evaluation_cfg, from_the_stance
 from mute.support.files import write_file
 from mute.web.scene_text import scene_text
-from mute.web.sound_tables import packed, sound_tables
+from mute.web.sound_tables import SAMPLE_RATE, packed, sound_tables
 
 __all__ = ["FORMAT", "write_assets"]
 
-FORMAT = 1
+FORMAT = 2
 """Version of the layout of `page.json`; the page refuses any other."""
 
 _LABELS = {
@@ -124,7 +127,10 @@ def page_data(policies: Sequence[Policy], cfg: QuadrupedEnvCfg) -> dict[str, Any
             "trained": {"vx": speeds.lin_vel_x, "vy": speeds.lin_vel_y, "wz": speeds.ang_vel_z},
             "start": dataclasses.asdict(Command()),
         },
-        "footfall": dataclasses.asdict(cfg.footfall),
+        "footfall": {**dataclasses.asdict(cfg.footfall), "near": NEAR},
+        "contact": {"release": RELEASE, "at_limit": AT_LIMIT},
+        "settle_time": SETTLE_TIME,
+        "sample_rate": SAMPLE_RATE,
         "surface": _SURFACE,
         "floors": [
             {

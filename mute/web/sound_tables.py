@@ -19,6 +19,7 @@ from scipy import signal
 from mute.acoustics.air import AIR_DENSITY, AIR_IMPEDANCE, SPEED_OF_SOUND
 from mute.acoustics.body import SHELL, SHELL_PANELS, load_transmissibility
 from mute.acoustics.floors import FLOORS, Floor
+from mute.acoustics.listener import WAV_FULL_SCALE
 from mute.acoustics.metering.levels import (
     P_REF,
     READINGS_PER_SECOND,
@@ -38,10 +39,11 @@ from mute.acoustics.sources.response import PLACES, modes_seed
 from mute.acoustics.sources.scuffing import SCUFF_BAND, SCUFF_EFFICIENCY
 from mute.acoustics.sources.shell import NUM_FEET, SIDES
 from mute.envs.scene import FOOT_RADIUS
+from mute.evaluation.noise_levels import SETTLE_TIME
 
 __all__ = ["FORMAT", "packed", "sound_tables"]
 
-FORMAT = 1
+FORMAT = 2
 """Version of the tables' layout; the page refuses any other."""
 
 SAMPLE_RATE = 48000
@@ -70,6 +72,7 @@ def sound_tables() -> dict[str, Any]:
     return {
         "format": FORMAT,
         "sample_rate": SAMPLE_RATE,
+        "full_scale": WAV_FULL_SCALE,
         "air": {"speed_of_sound": SPEED_OF_SOUND, "impedance": AIR_IMPEDANCE},
         "tiers": [_tier_table(divisor) for divisor, _ in _TIERS],
         "landing": {
@@ -114,6 +117,7 @@ def sound_tables() -> dict[str, Any]:
             "time_constant": TIME_CONSTANTS["fast"],
             "readings_per_second": READINGS_PER_SECOND,
             "settling": settling_time("fast"),
+            "settle_time": SETTLE_TIME,
         },
     }
 

@@ -7,6 +7,7 @@ import { Simulation } from "./physics/simulation.js";
 import { Picture } from "./picture/picture.js";
 import { PolicyShelf } from "./policy/shelf.js";
 import { hearingStarter, soundFiles } from "./sound_files.js";
+import { messageOf } from "./support/messages.js";
 import { anyElement, canvas } from "./ui/elements.js";
 import { Panel } from "./ui/panel.js";
 
@@ -19,13 +20,14 @@ async function begin(): Promise<void> {
   const simulation = new Simulation(mujoco, scenes, page);
   const shelf = makeShelf(loaded, simulation.timestep);
   const sound = soundFiles(fetchFile);
-  const startHearing = hearingStarter(sound, simulation.timestep);
+  const startHearing = hearingStarter(sound, simulation.timestep, page.sample_rate);
   const [picture, why] = makePicture(() => new Picture(canvas("view"), mujoco, scenes.flat));
   const first = await shelf.get(settings.controller);
   const panel = new Panel(page);
   const app = new App({ page, simulation, shelf, first, settings, picture, panel, startHearing });
   panel.ready(why);
-  if (faults.length) app.tellFaults(faults);
+  if (!startHearing) panel.showNoSound();
+  if (faults.length) panel.tellFaults(faults);
   else panel.tell(startHearing ? welcome(settings.floor) : NO_SOUND);
   app.run();
   performance.mark("interactive");
@@ -55,9 +57,8 @@ function welcome(floor: string): string {
 }
 
 begin().catch((error: unknown) => {
-  const line = error instanceof Error ? error.message : String(error);
   const loading = anyElement("loading");
   loading.hidden = false;
-  loading.textContent = `The page cannot begin: ${line}.`;
+  loading.textContent = `The page cannot begin: ${messageOf(error)}.`;
   anyElement("note").textContent = loading.textContent;
 });

@@ -1,7 +1,7 @@
 /** The page's sound: its tables, loaded once they are wanted, and what makes sound of them. */
 
 import type { Hearing } from "./control/hearing.js";
-import { startPlayer } from "./sound/player.js";
+import { openContext, startPlayer } from "./sound/player.js";
 import { loadSoundTables, type SoundTables } from "./sound/tables.js";
 
 /** Address of the audio thread's part. */
@@ -23,11 +23,17 @@ export function soundFiles(load: (name: string) => Promise<Response>): SoundFile
   };
 }
 
-/** Returns what begins sound on a floor, in a gesture; null where this browser has none. */
+/** Begins sound on a floor, in a gesture. */
+export type StartHearing = (surface: string) => Promise<Hearing>;
+
+/** Returns what begins sound; null where this browser has none. */
 export function hearingStarter(
   files: SoundFiles,
   timestep: number,
-): ((surface: string) => Promise<Hearing>) | null {
+  sampleRate: number,
+): StartHearing | null {
   if (typeof AudioContext !== "function" || typeof AudioWorkletNode !== "function") return null;
-  return async (surface) => startPlayer(await files(), WORKLET, { surface, timestep });
+  // The context first, while the gesture lasts; then what takes time.
+  return async (surface) =>
+    startPlayer(openContext(sampleRate), files(), WORKLET, { surface, timestep });
 }

@@ -13,7 +13,7 @@ import { PixelBudget } from "../src/picture/pixel_budget.js";
 import { fromAddress, initialSettings, toAddress } from "../src/settings/settings.js";
 import { page } from "./files.js";
 
-const steering = () => new Steering(page.command.start, page.command.limits);
+const steering = () => new Steering(page.command.start, page.command);
 
 test("ten steps up and ten down come back to exactly nothing, which asks to stand", () => {
   const robot = steering();
@@ -37,6 +37,24 @@ test("who was stopped goes on as before, at the beta of now", () => {
   robot.set({ beta: 1 });
   robot.stopOrGo();
   assert.deepEqual(robot.command, { vx: 0.7, vy: 0, wz: 0.2, beta: 1 });
+});
+
+test("who came stopped, by an address say, goes as the page begins", () => {
+  const robot = new Steering({ vx: 0, vy: 0, wz: 0, beta: 0.8 }, page.command);
+  assert.ok(robot.stands);
+  robot.stopOrGo();
+  assert.deepEqual(robot.command, { ...page.command.start, beta: 0.8 });
+  robot.stopOrGo();
+  assert.ok(robot.stands);
+});
+
+test("a pull to the end asks for the speeds that are trained, in steps of the sliders", () => {
+  const robot = steering();
+  const { vx, wz } = page.command.trained;
+  robot.pull(1, 0, -1);
+  assert.deepEqual([robot.command.vx, robot.command.wz], [vx[1], wz[0]]);
+  robot.pull(-1, 0.031, 0);
+  assert.deepEqual([robot.command.vx, robot.command.vy, robot.command.wz], [vx[0], 0, 0]);
 });
 
 test("the clock has a step due for each period, whatever the rate of looks", () => {
@@ -137,21 +155,65 @@ test("a machine that draws slowly is given less to draw, one that keeps up is no
   assert.ok(quick.shadows);
 });
 
-test("a comparison walks at both betas for as long, and tells the difference", () => {
+/** A comparison, and all that it tells. */
+function comparing() {
   const told: string[] = [];
   const begun: number[] = [];
+  const counted: number[] = [];
   let ended = 0;
   const comparison = new Comparison({
     begin: (beta) => begun.push(beta),
     tell: (text) => told.push(text),
+    count: (seconds) => counted.push(seconds),
     end: () => ended++,
   });
+  /** Walks in control steps, of which all but the first half second is heard. */
+  const walk = (seconds: number, mnl: number) => {
+    for (let step = 0; step <= 50 * seconds; step++) {
+      comparison.follow(step / 50, { mnl, seconds: Math.max(step / 50 - 0.5, 0) });
+    }
+  };
+  return { comparison, told, begun, counted, walk, ended: () => ended };
+}
+
+test("a comparison hears both betas for ten seconds, and tells the difference", () => {
+  const { comparison, told, begun, counted, walk, ended } = comparing();
   comparison.start();
-  for (let step = 0; step <= 575; step++) comparison.follow(0.02 * step, 67.4);
+  comparison.start(); // that it runs already changes nothing
+  assert.deepEqual(begun, [0]);
+  walk(10.4, 67.4);
+  assert.deepEqual(begun, [0]);
+  comparison.follow(10.5, { mnl: 67.4, seconds: 10 });
   assert.deepEqual(begun, [0, 1]);
-  comparison.follow(11.6, NaN); // nothing is heard of it yet
+  comparison.follow(12, { mnl: NaN, seconds: 10 }); // nothing is heard of it yet
   assert.ok(comparison.isRunning);
-  comparison.follow(11.7, 63.1);
-  assert.equal(told[told.length - 1], "β 0: 67.4 dBA. β 1: 63.1 dBA. 4.3 dB quieter at β 1.");
-  assert.deepEqual([ended, comparison.isRunning], [1, false]);
+  comparison.follow(12.1, { mnl: 63.1, seconds: 10 });
+  assert.equal(told.at(-1), "β 0: 67.4 dBA. β 1: 63.1 dBA. 4.3 dB quieter at β 1.");
+  assert.deepEqual([ended(), comparison.isRunning], [1, false]);
+  // Each beta and the end are told once, and each second is counted once.
+  assert.equal(told.length, 3);
+  assert.deepEqual(counted.slice(0, 11), [10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 10]);
+});
+
+test("a comparison tells of falls, and anew of the next one's", () => {
+  const { comparison, told, walk } = comparing();
+  comparison.fell(); // before it begins is nobody's
+  comparison.start();
+  comparison.fell();
+  comparison.fell();
+  walk(10.5, 67);
+  walk(10.5, 63);
+  assert.match(told.at(-1) ?? "", /4\.0 dB quieter at β 1\. Falls, which are left out: 2 at β 0\.$/);
+  comparison.start();
+  walk(10.5, 67);
+  walk(10.5, 67.5);
+  assert.match(told.at(-1) ?? "", /0\.5 dB louder at β 1\.$/);
+});
+
+test("a comparison of what cannot be heard ends, and says so", () => {
+  const { comparison, told, ended } = comparing();
+  comparison.start();
+  for (let step = 0; step <= 50 * 41; step++) comparison.follow(step / 50, { mnl: NaN, seconds: 0 });
+  assert.equal(told.at(-1), "Not compared: in 40 s at β 0 only 0 s could be heard.");
+  assert.deepEqual([ended(), comparison.isRunning], [1, false]);
 });

@@ -15,11 +15,15 @@ import pytest
 from places import REPOSITORY, RESOURCES
 
 from mute.acoustics.floors import FLOORS
+from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
+from mute.acoustics.recorder import AT_LIMIT, RELEASE
 from mute.checkpoint import load_checkpoint, save_checkpoint
 from mute.command_lines.web import main
 from mute.controllers import load_policy
 from mute.envs.quadruped_env import QuadrupedEnv, scene_of
-from mute.envs.scene import STAND_JOINT_POS, SceneCfg
+from mute.envs.scene import FOOT_RADIUS, STAND_JOINT_POS, SceneCfg
+from mute.envs.terrain.ground import NEAR
+from mute.evaluation.noise_levels import SETTLE_TIME
 from mute.support.errors import MuteError
 from mute.web.assets import walking_cfg
 from mute.web.scene_text import check_same, scene_text
@@ -76,6 +80,22 @@ def test_page_data_tells_every_floor_as_sound_has_it(assets: Path):
     for name, floor in FLOORS.items():
         assert told[name]["friction"] == floor.friction
         assert tuple(told[name]["solref"]) == floor.solref
+
+
+def test_the_page_understands_the_layout_that_is_written_and_has_no_figure_of_its_own(assets: Path):
+    source = REPOSITORY / "web" / "src"
+    data = json.loads((assets / "page.json").read_text())
+    assert f"const FORMAT = {data['format']};" in (source / "physics" / "page_data.ts").read_text()
+    assert data["contact"] == {"release": RELEASE, "at_limit": AT_LIMIT}
+    assert data["footfall"]["near"] == NEAR
+    assert data["settle_time"] == SETTLE_TIME
+    assert (data["sample_rate"], data["foot_radius"]) == (SAMPLE_RATE, FOOT_RADIUS)
+    sound = json.loads((assets / "sound.json").read_text())
+    assert sound["full_scale"] == WAV_FULL_SCALE
+    assert sound["meter"]["settle_time"] == SETTLE_TIME
+    for name in ("control/footfalls.ts", "sound/recorder.ts", "sound/playback.ts"):
+        for figure in (RELEASE, AT_LIMIT, NEAR, FOOT_RADIUS):
+            assert f" {figure};" not in (source / name).read_text()
 
 
 def test_every_controller_is_an_export_that_runs_at_the_rate_of_the_scene(assets: Path):

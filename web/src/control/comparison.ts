@@ -4,22 +4,35 @@
 export interface Compared {
   /** Begins the walk again, at some beta. */
   begin(beta: number): void;
-  /** Tells how it goes, or went. */
+  /** Tells how it goes, or went; called where that changes. */
   tell(text: string, isRunning: boolean): void;
+  /** Tells how many seconds are left of this walk. */
+  count(seconds: number): void;
   /** Puts things back as they were. */
   end(): void;
 }
 
-/** Time that is walked before it is measured, s: the robot and the meter have to get going. */
-const SETTLE = 1.5;
+/** What was heard of the walk, see `Levels`. */
+export interface Heard {
+  /** dBA. */
+  readonly mnl: number;
+  /** s. */
+  readonly seconds: number;
+}
+
 /** Time that is measured, s. */
 const MEASURED = 10;
+
+/** Time that may be walked for it, s: what a robot does that fell is in no level. */
+const LONGEST = 40;
 
 const BETAS = [0, 1];
 
 export class Comparison {
   private index = -1;
+  private left = NaN;
   private readonly levels: number[] = [];
+  private readonly falls = [0, 0];
 
   constructor(private readonly page: Compared) {}
 
@@ -27,8 +40,11 @@ export class Comparison {
     return this.index >= 0;
   }
 
+  /** Begins it, unless it is running. */
   start(): void {
+    if (this.isRunning) return;
     this.levels.length = 0;
+    this.falls.fill(0);
     this.next();
   }
 
@@ -43,25 +59,38 @@ export class Comparison {
   /**
    * Takes note of how far the walk is.
    *
-   * @param seconds Time walked, s.
-   * @param mnl Its mean noise level so far, dBA.
+   * @param walked Time walked, s.
+   * @param heard What was heard of it so far.
    */
-  follow(seconds: number, mnl: number): void {
+  follow(walked: number, heard: Heard): void {
     if (!this.isRunning) return;
-    // Of a walk that is hardly heard there is no level yet.
-    if (seconds < SETTLE + MEASURED || Number.isNaN(mnl)) {
-      const left = Math.max(Math.ceil(SETTLE + MEASURED - seconds), 0);
-      this.page.tell(`β ${BETAS[this.index]}: ${left} s to go. ${this.soFar()}`.trim(), true);
-      return;
+    if (heard.seconds >= MEASURED && !Number.isNaN(heard.mnl)) {
+      this.levels.push(heard.mnl);
+      this.next();
+    } else if (walked > LONGEST) {
+      this.stop(this.failure(heard));
+    } else {
+      this.count(Math.max(Math.ceil(MEASURED - heard.seconds), 0));
     }
-    this.levels.push(mnl);
-    this.next();
+  }
+
+  /** Takes note that the robot fell, or blew up, and begins anew. */
+  fell(): void {
+    if (this.isRunning) this.falls[this.index]++;
   }
 
   private next(): void {
     this.index++;
-    if (this.index < BETAS.length) this.page.begin(BETAS[this.index]);
-    else this.stop(this.verdict());
+    if (this.index >= BETAS.length) return this.stop(this.verdict());
+    this.page.begin(BETAS[this.index]);
+    this.page.tell(`β ${BETAS[this.index]} walks. ${this.soFar()}`.trim(), true);
+    this.count(MEASURED);
+  }
+
+  private count(seconds: number): void {
+    if (seconds === this.left) return;
+    this.left = seconds;
+    this.page.count(seconds);
   }
 
   private soFar(): string {
@@ -72,6 +101,18 @@ export class Comparison {
     const [loud, quiet] = this.levels;
     const difference = loud - quiet;
     const word = difference >= 0 ? "quieter" : "louder";
-    return `${this.soFar()} ${Math.abs(difference).toFixed(1)} dB ${word} at β 1.`;
+    const words = `${Math.abs(difference).toFixed(1)} dB ${word} at β 1.`;
+    return `${this.soFar()} ${words} ${this.fallen()}`.trim();
+  }
+
+  private failure({ seconds }: Heard): string {
+    const told = `Not compared: in ${LONGEST} s at β ${BETAS[this.index]} only`;
+    return `${told} ${seconds.toFixed(0)} s could be heard. ${this.fallen()}`.trim();
+  }
+
+  private fallen(): string {
+    const told = this.falls.map((falls, i) => (falls ? `${falls} at β ${BETAS[i]}` : ""));
+    const all = told.filter(Boolean).join(", ");
+    return all && `Falls, which are left out: ${all}.`;
   }
 }

@@ -9,9 +9,6 @@ import type { Simulation } from "../physics/simulation.js";
 const FEET = 4;
 const NOWHERE = -1e6;
 
-/** How far from a foot ground counts as near, m: `envs.terrain.ground`. */
-const NEAR = 0.12;
-
 export class Footfalls {
   /** Feet whose landing was confirmed in this control step. */
   readonly touchdown = new Uint8Array(FEET);
@@ -109,7 +106,8 @@ export class Footfalls {
   private raise(simulation: Simulation, foot: number, lifting: boolean, inStance: boolean): void {
     const [x, , z] = simulation.feet.position.subarray(3 * foot, 3 * foot + 3);
     const height = z - this.page.foot_radius;
-    const ground = Math.max(...[0, NEAR, -NEAR].map((dx) => simulation.groundHeight(x + dx)));
+    const { near } = this.page.footfall;
+    const ground = Math.max(...[0, near, -near].map((dx) => simulation.groundHeight(x + dx)));
     if (lifting) {
       this.highest[foot] = height;
       this.highestGround[foot] = ground;

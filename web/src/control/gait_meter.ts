@@ -34,17 +34,17 @@ const FEET = 4;
 export class GaitMeter {
   private age = 0;
   private steps = 0;
-  private sums = new Map<string, number>();
+  private readonly sums = new Map<string, number>();
   private falls = 0;
   private readonly settleSteps: number;
 
   /**
    * @param stepTime Control period, s.
-   * @param settleTime Time after the robot begins that is not measured, s.
+   * @param settleTime Time after the robot begins, or begins anew, that is not measured, s.
    */
   constructor(
     private readonly stepTime: number,
-    settleTime = 1,
+    settleTime: number,
   ) {
     this.settleSteps = Math.round(settleTime / stepTime);
   }
@@ -68,10 +68,17 @@ export class GaitMeter {
     }
   }
 
-  /** Takes note of a fall, after which the robot begins anew. */
-  fell(): void {
-    this.falls++;
+  /** Takes note that the robot begins anew, after a fall or because its numbers blew up. */
+  interrupt(isFall: boolean): void {
+    if (isFall) this.falls++;
     this.age = 0;
+  }
+
+  /** Forgets all but falls. */
+  forget(): void {
+    this.age = 0;
+    this.steps = 0;
+    this.sums.clear();
   }
 
   gait(): Gait {

@@ -1,7 +1,7 @@
 /** What the page asks of its sound, and the batches of readings that it gives it. */
 
 import { READINGS_LENGTH, viewReadings } from "../sound/readings.js";
-import { Recorder } from "../sound/recorder.js";
+import { type ContactFigures, Recorder } from "../sound/recorder.js";
 import type { Simulation } from "../physics/simulation.js";
 
 /** Levels in dBA; NaN before there is one. */
@@ -25,7 +25,10 @@ export interface Hearing {
   setSurface(name: string): void;
   /** The walk begins anew. */
   reset(): void;
-  setVolume(gain: number): void;
+  /** The walk goes on in another way: its figures begin anew. */
+  measureAnew(): void;
+  /** The robot fell, and begins anew. */
+  leaveOut(): void;
   suspend(): Promise<void>;
   resume(): Promise<void>;
   onLevels: ((levels: Levels) => void) | null;
@@ -40,12 +43,14 @@ export class ReadingsBatcher {
   /**
    * @param simulation What is heard.
    * @param steps Physics steps of a batch: those of a control step.
+   * @param contacts What contacts are told by.
    */
   constructor(
     simulation: Simulation,
     private readonly steps: number,
+    contacts: ContactFigures,
   ) {
-    this.recorder = new Recorder(simulation.timestep, simulation.floor.friction);
+    this.recorder = new Recorder(simulation.timestep, simulation.floor.friction, contacts);
     this.batch = new Float32Array(steps * READINGS_LENGTH);
   }
 

@@ -1,6 +1,6 @@
 /** A walk as fast as the machine can, and its figures: for tests, and for whoever is curious. */
 
-import type { Command, PageData } from "../physics/page_data.js";
+import { type Command, contactFigures, type PageData } from "../physics/page_data.js";
 import type { Ground, Simulation } from "../physics/simulation.js";
 import type { Policy } from "../policy/policy.js";
 import type { Gait } from "./gait_meter.js";
@@ -31,6 +31,8 @@ export interface Measured {
 /** Hears a walk without a loudspeaker. */
 export interface OfflineHearing {
   feed(batch: Float32Array): void;
+  /** The robot fell, and begins anew. */
+  leaveOut(): void;
   readonly mnl: number;
   readonly pnl: number;
 }
@@ -44,6 +46,8 @@ export class KeptReadings implements OfflineHearing {
   feed(batch: Float32Array): void {
     this.batches.push(batch);
   }
+
+  leaveOut(): void {}
 
   /** All physics steps, one after the other. */
   get all(): Float32Array {
@@ -77,13 +81,15 @@ export function measure(
   simulation.setGround(walk.terrain, walk.level);
   const robot = new Walk(simulation, policy, page, walk.command);
   if (walk.first_state) robot.restartFrom(walk.first_state.qpos, walk.first_state.qvel);
-  const batcher = new ReadingsBatcher(simulation, policy.decimation);
+  const batcher = new ReadingsBatcher(simulation, policy.decimation, contactFigures(page));
   const hearing = hear(walk.surface);
   const steps = Math.round(walk.seconds / robot.stepTime);
   for (let step = 0; step < steps; step++) {
     const outcome = robot.step(batcher.listen);
     hearing.feed(batcher.take());
-    if (outcome !== "walking") batcher.restart(simulation);
+    if (outcome === "walking") continue;
+    batcher.restart(simulation);
+    hearing.leaveOut();
   }
   const qpos = Array.from(simulation.qpos);
   simulation.delete();

@@ -4,13 +4,7 @@
  */
 
 import { LevelMeter } from "../sound/level_meter.js";
-import {
-  FULL_SCALE,
-  PROCESSOR,
-  type ProcessorOptions,
-  type ToProcessor,
-} from "../sound/messages.js";
-import { SETTLING } from "../sound/playback.js";
+import { PROCESSOR, type ProcessorOptions, type ToProcessor } from "../sound/messages.js";
 import { READINGS_LENGTH } from "../sound/readings.js";
 import type { SoundTables } from "../sound/tables.js";
 
@@ -74,7 +68,7 @@ export async function renderSound(
 /** Returns the levels of samples, of which 1 is full scale, dBA. */
 export function levelsOf(samples: Float32Array, tables: SoundTables): { mnl: number; pnl: number } {
   const meter = new LevelMeter(tables);
-  meter.forget(SETTLING);
-  meter.update(samples.map((sample) => FULL_SCALE * sample));
+  meter.measureAnew();
+  meter.update(samples.map((sample) => tables.full_scale * sample));
   return { mnl: meter.mnl, pnl: meter.pnl };
 }

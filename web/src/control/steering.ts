@@ -2,14 +2,22 @@
 
 import type { Axis, Command, PageData } from "../physics/page_data.js";
 
+/** Steps of what is set by hand, as those of the sliders. */
+const FINENESS = 0.05;
+
 export class Steering {
+  /** How it goes on where it was stopped; never a stand. */
   private going: Command;
 
+  /**
+   * @param current What is asked at first, maybe to stand.
+   * @param page Limits, and what is asked where nobody asked for anything.
+   */
   constructor(
     private current: Command,
-    private readonly limits: PageData["command"]["limits"],
+    private readonly page: PageData["command"],
   ) {
-    this.going = current;
+    this.going = this.stands ? page.start : current;
   }
 
   get command(): Command {
@@ -26,11 +34,20 @@ export class Steering {
   set(parts: Partial<Command>): void {
     const next: Record<Axis, number> = { ...this.current };
     for (const [axis, value] of Object.entries(parts) as [Axis, number][]) {
-      const [low, high] = this.limits[axis];
+      const [low, high] = this.page.limits[axis];
       // Rounded, so that steps of 0.1 come back to exactly 0, which asks to stand.
       next[axis] = Math.min(Math.max(Math.round(1e6 * value) / 1e6, low), high);
     }
     this.current = next;
+  }
+
+  /** Sets speeds by hand: shares from -1 to 1 of those that are trained. */
+  pull(forward: number, left: number, turn: number): void {
+    const part = (share: number, axis: "vx" | "vy" | "wz") => {
+      const [low, high] = this.page.trained[axis];
+      return FINENESS * Math.round((share < 0 ? -share * low : share * high) / FINENESS);
+    };
+    this.set({ vx: part(forward, "vx"), vy: part(left, "vy"), wz: part(turn, "wz") });
   }
 
   /** Adds to a part of the command. */

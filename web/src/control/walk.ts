@@ -50,11 +50,6 @@ export class Walk {
     return this.steps * this.stepTime;
   }
 
-  /** What the trunk does now. */
-  get trunk(): Observer {
-    return this.seen;
-  }
-
   /** Lets another policy drive, which begins with a robot that stands. */
   drive(policy: Policy): void {
     this.policy = policy;
@@ -103,6 +98,11 @@ export class Walk {
     return this.meter.gait();
   }
 
+  /** Begins the figures anew, of a walk that goes on in another way. Falls stay counted. */
+  measureAnew(): void {
+    this.meter.forget();
+  }
+
   private begin(): void {
     this.steps = 0;
     this.feet = this.newFeet();
@@ -111,7 +111,7 @@ export class Walk {
   }
 
   private again(outcome: Outcome): Outcome {
-    if (outcome === "fallen") this.meter.fell();
+    this.meter.interrupt(outcome === "fallen");
     this.simulation.reset();
     this.forget();
     return outcome;
@@ -128,6 +128,6 @@ export class Walk {
   }
 
   private newMeter(): GaitMeter {
-    return new GaitMeter(this.stepTime);
+    return new GaitMeter(this.stepTime, this.page.settle_time);
   }
 }

@@ -57,13 +57,31 @@ export interface PageData {
     readonly min_segment: number;
     readonly max_segment: number;
     readonly landing_window: number;
+    /** How far from a foot ground counts as near, m. */
+    readonly near: number;
   };
+  /** What the onset of contacts and sliding are told by, see `mute.acoustics.recorder`. */
+  readonly contact: {
+    /** Time without contact after which the next contact is a landing, s. */
+    readonly release: number;
+    /** Share of the largest friction from which on a foot slides. */
+    readonly at_limit: number;
+  };
+  /** Time after the robot begins that is in no figure, s. */
+  readonly settle_time: number;
+  /** Of the sound, Hz. */
+  readonly sample_rate: number;
   readonly surface: string;
   readonly floors: readonly Floor[];
   readonly stairs: StairsFigures;
 }
 
-const FORMAT = 1;
+/** Returns what the onset of contacts and sliding are told by. */
+export function contactFigures({ contact, foot_radius }: PageData) {
+  return { ...contact, foot_radius };
+}
+
+const FORMAT = 2;
 
 /**
  * Takes what `page.json` holds.

@@ -40,7 +40,7 @@ export class Picture {
   private readonly budget: PixelBudget;
   private readonly poses: [Pose, Pose];
   /** Where the camera looks from, beside the robot: rad, rad and m. */
-  private readonly view = { azimuth: FROM_THE_FRONT, elevation: 0.3, distance: 1.9 };
+  readonly view = { azimuth: FROM_THE_FRONT, elevation: 0.3, distance: 1.9 };
   private readonly target = new Vector3(0, 0, 0.25);
   private size = { width: 1, height: 1 };
 

@@ -30,6 +30,11 @@ export class PolicyShelf {
     return this.put(name, await this.load(entry.file));
   }
 
+  /** Returns what a file of the visitor's is called: not as a policy of the page. */
+  nameFor(file: string): string {
+    return this.entries.some(({ name }) => name === file) ? `${file} (file)` : file;
+  }
+
   /**
    * Adds a file of the visitor's, and returns its policy.
    *

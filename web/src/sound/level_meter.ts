@@ -16,6 +16,8 @@ export class LevelMeter {
   private readonly reference: number;
   private readonly perReading: number;
   private readonly settling: number;
+  /** Time of a walk that is in no figure, s: it has to get going, and then the detector. */
+  private readonly walkSettling: number;
   private readonly sampleRate: number;
   private begun = false;
   private detected = 0;
@@ -29,7 +31,6 @@ export class LevelMeter {
   private readingSum = 0;
   private readingCount = 0;
   private largestReading = -Infinity;
-  private lastReading = NaN;
 
   constructor(tables: SoundTables) {
     const { meter, sample_rate: rate } = tables;
@@ -39,17 +40,13 @@ export class LevelMeter {
     this.reference = meter.reference;
     this.perReading = rate / meter.readings_per_second;
     this.settling = Math.round(meter.settling * rate);
+    this.walkSettling = meter.settle_time + meter.settling;
     this.countsFrom = this.settling;
   }
 
   /** What the meter shows now, dBA. */
   get level(): number {
     return this.decibels(this.detected);
-  }
-
-  /** The last of the readings, taken 20 times a second, dBA; NaN before the first. */
-  get reading(): number {
-    return this.lastReading;
   }
 
   /** How many readings the figures are made of. */
@@ -92,16 +89,23 @@ export class LevelMeter {
    * @param settle Time that is to be left out after it as well, s.
    */
   forget(settle = 0): void {
-    this.sumsFrom = this.samples + Math.round(settle * this.sampleRate);
-    // What has been read already is not read again.
-    this.countsFrom = Math.max(this.countsFrom, this.sumsFrom, this.samples + 1);
+    this.pass(settle);
     this.sum = 0;
     this.summed = 0;
     this.largest = 0;
     this.readingSum = 0;
     this.readingCount = 0;
     this.largestReading = -Infinity;
-    this.lastReading = NaN;
+  }
+
+  /** The same where a walk begins, or goes on in another way. */
+  measureAnew(): void {
+    this.forget(this.walkSettling);
+  }
+
+  /** Keeps the figures, but leaves out what comes until a robot that fell walks again. */
+  leaveOut(): void {
+    this.pass(this.walkSettling);
   }
 
   /** Starts from silence, and leaves out of the figures what is as long as the detector settles. */
@@ -113,6 +117,12 @@ export class LevelMeter {
     this.weighting.reset();
     this.forget();
     this.countsFrom = this.settling;
+  }
+
+  private pass(settle: number): void {
+    this.sumsFrom = this.samples + Math.round(settle * this.sampleRate);
+    // What has been read already is not read again.
+    this.countsFrom = Math.max(this.countsFrom, this.sumsFrom, this.samples + 1);
   }
 
   private take(length: number): void {
@@ -137,7 +147,6 @@ export class LevelMeter {
 
   private read(): void {
     const reading = this.decibels(this.detected);
-    this.lastReading = reading;
     this.readingSum += reading;
     this.readingCount++;
     if (reading > this.largestReading) this.largestReading = reading;
@@ -146,9 +155,4 @@ export class LevelMeter {
   private decibels(meanSquare: number): number {
     return 10 * Math.log10(meanSquare / (this.reference * this.reference));
   }
-}
-
-/** Returns a sound level meter. */
-export function createLevelMeter(tables: SoundTables): LevelMeter {
-  return new LevelMeter(tables);
 }

@@ -6,12 +6,6 @@ import type { SoundTables } from "./tables.js";
 /** Name that the audio thread's part is registered by. */
 export const PROCESSOR = "mute-sound";
 
-/**
- * Sound pressure of a sample of 1, Pa, as in the WAV files of Python. Always the same, so that a quiet
- * walk sounds quiet beside a loud one; a boarded floor under a foot has peaks of half of it.
- */
-export const FULL_SCALE = 10;
-
 /** What the audio thread begins with. */
 export interface ProcessorOptions {
   readonly tables: SoundTables;
@@ -21,7 +15,10 @@ export interface ProcessorOptions {
 export type ToProcessor =
   | { readonly kind: "readings"; readonly batch: Float32Array }
   | { readonly kind: "surface"; readonly name: string }
-  | { readonly kind: "reset"; readonly walk: number };
+  /** The walk begins anew, or goes on in another way: its figures are those of another one. */
+  | { readonly kind: "reset" | "measure"; readonly walk: number }
+  /** The robot fell. */
+  | { readonly kind: "fall" };
 
 /** Levels in dBA; NaN before there is one. */
 export interface Levels {
@@ -38,6 +35,6 @@ export interface Levels {
 export interface FromProcessor extends Levels {
   /** Time that waits to be heard, s. */
   readonly waiting: number;
-  /** Number of the walk that this is of: that of the last reset, or 0. */
+  /** Number of the walk that this is of: that of the last message with one, or 0. */
   readonly walk: number;
 }

@@ -2,7 +2,6 @@
 
 import { LevelMeter } from "./level_meter.js";
 import type { SoundscapeOptions } from "./options.js";
-import { SETTLING } from "./playback.js";
 import { type ContactReadings, READINGS_LENGTH, viewReadings } from "./readings.js";
 import { Soundscape } from "./soundscape.js";
 import type { SoundTables } from "./tables.js";
@@ -16,7 +15,7 @@ export class OfflineSound {
   constructor(tables: SoundTables, options: SoundscapeOptions) {
     this.soundscape = new Soundscape(tables, options);
     this.meter = new LevelMeter(tables);
-    this.meter.forget(SETTLING);
+    this.meter.measureAnew();
     this.block = new Float32Array(Math.round((options.timestep ?? 0.001) * tables.sample_rate));
   }
 
@@ -28,6 +27,11 @@ export class OfflineSound {
   /** Peak noise level so far, dBA. */
   get pnl(): number {
     return this.meter.pnl;
+  }
+
+  /** The robot fell and begins anew. */
+  leaveOut(): void {
+    this.meter.leaveOut();
   }
 
   /** Hears physics steps, one after the other. */

@@ -9,9 +9,6 @@ import { type ContactReadings, READINGS_LENGTH, viewReadings } from "./readings.
 import { Soundscape } from "./soundscape.js";
 import type { SoundTables } from "./tables.js";
 
-/** What is heard of a walk at its start is left out of its figures, as in Python, s. */
-export const SETTLING = 1.5;
-
 /** Supply with which playing begins, s: batches come with the pictures, 30 or 60 times a second. */
 const FIRST_SUPPLY = 0.08;
 /** By how much more is kept after each time that it ran out, and what is kept at most, s. */
@@ -31,7 +28,7 @@ export class Playback {
   constructor(tables: SoundTables, options: SoundscapeOptions) {
     this.soundscape = new Soundscape(tables, options);
     this.meter = new LevelMeter(tables);
-    this.meter.forget(SETTLING);
+    this.meter.measureAnew();
     this.timestep = options.timestep ?? 0.001;
   }
 
@@ -65,8 +62,18 @@ export class Playback {
   reset(): void {
     this.soundscape.reset();
     this.meter.reset();
-    this.meter.forget(SETTLING);
+    this.meter.measureAnew();
     this.plays = false;
+  }
+
+  /** The walk goes on in another way, and the figures are of what comes. */
+  measureAnew(): void {
+    this.meter.measureAnew();
+  }
+
+  /** The robot begins anew after a fall, of which nothing is in the figures. */
+  leaveOut(): void {
+    this.meter.leaveOut();
   }
 
   /** Gives the next samples, Pa. */

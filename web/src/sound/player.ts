@@ -1,7 +1,6 @@
 /** The page's end of the sound: starts the audio thread, and gives it what the physics tells. */
 
 import {
-  FULL_SCALE,
   type FromProcessor,
   type Levels,
   PROCESSOR,
@@ -11,14 +10,11 @@ import {
 import type { SoundscapeOptions } from "./options.js";
 import type { SoundTables } from "./tables.js";
 
-/** Time in which the volume changes, s: at once would click. */
-const VOLUME_TIME = 0.02;
-
 /**
- * Gain of the volume 1: a sound pressure of 2.5 Pa is as loud as can be. At the full scale of 10 Pa,
- * which nothing exceeds, small loudspeakers would be too quiet for a walk.
+ * Sound pressure that is as loud as can be, Pa. At the full scale of samples, which nothing exceeds,
+ * small loudspeakers would be too quiet for a walk.
  */
-const LOUDNESS = FULL_SCALE / 2.5;
+const LOUDEST = 2.5;
 
 /** Frequency below which it is not played, Hz: few loudspeakers give it, and boards struck by a foot
  * have so much of it that it would leave the rest no room. Levels know nothing of this. */
@@ -36,7 +32,6 @@ export class Player {
   constructor(
     private readonly context: AudioContext,
     private readonly node: AudioWorkletNode,
-    private readonly volume: GainNode,
   ) {
     node.port.onmessage = (event: MessageEvent<FromProcessor>) => {
       // What was said before the audio thread heard of a new walk is of the one before.
@@ -62,9 +57,15 @@ export class Player {
     this.node.port.postMessage({ kind: "reset", walk: this.walk } satisfies ToProcessor);
   }
 
-  /** Sets the volume, 1 unless told. Levels do not change with it. */
-  setVolume(gain: number): void {
-    this.volume.gain.setTargetAtTime(LOUDNESS * gain, this.context.currentTime, VOLUME_TIME);
+  /** The walk goes on, but its figures begin anew: it is another one from now on. */
+  measureAnew(): void {
+    this.walk++;
+    this.node.port.postMessage({ kind: "measure", walk: this.walk } satisfies ToProcessor);
+  }
+
+  /** The robot fell, and begins anew: that is in no figure. */
+  leaveOut(): void {
+    this.node.port.postMessage({ kind: "fall" } satisfies ToProcessor);
   }
 
   /** Stops, where it is; time stands still for what is heard. */
@@ -76,33 +77,40 @@ export class Player {
   resume(): Promise<void> {
     return this.context.resume();
   }
-
-  /** Ends for good. */
-  async close(): Promise<void> {
-    this.node.port.onmessage = null;
-    this.node.disconnect();
-    await this.context.close();
-  }
 }
 
 /**
- * Starts the sound; to be called in a gesture, as browsers demand.
+ * Makes a context and lets it run. To be called in a gesture itself and not after something that takes
+ * time, or some browsers keep it silent.
  *
- * @param tables What Python worked out.
+ * @param sampleRate Hz.
+ * @throws Error That says in a line what is missing.
+ */
+export function openContext(sampleRate: number): AudioContext {
+  if (typeof AudioContext !== "function") throw new Error("this browser has no Web Audio");
+  const context = new AudioContext({ sampleRate, latencyHint: "interactive" });
+  // Whoever waits for it again, in `startPlayer`, is told what goes wrong.
+  context.resume().catch(() => undefined);
+  return context;
+}
+
+/**
+ * Starts the sound.
+ *
+ * @param context Where it is heard, from `openContext`. It is closed if anything fails.
+ * @param loading What Python worked out, which may still be on its way.
  * @param worklet Address of the bundled `worklet.ts`.
  * @param options Floor and more.
- * @throws Error that says in a line what is missing.
+ * @throws Error That says in a line what is missing.
  */
 export async function startPlayer(
-  tables: SoundTables,
+  context: AudioContext,
+  loading: SoundTables | Promise<SoundTables>,
   worklet: string,
   options: SoundscapeOptions,
 ): Promise<Player> {
-  if (typeof AudioContext !== "function") {
-    throw new Error("this browser has no Web Audio");
-  }
-  const context = new AudioContext({ sampleRate: tables.sample_rate, latencyHint: "interactive" });
   try {
+    const tables = await loading;
     if (!("audioWorklet" in context)) {
       throw new Error("this browser has no audio worklets here; they need https or localhost");
     }
@@ -113,11 +121,11 @@ export async function startPlayer(
       outputChannelCount: [2],
       processorOptions,
     });
-    const volume = new GainNode(context, { gain: LOUDNESS });
+    const volume = new GainNode(context, { gain: tables.full_scale / LOUDEST });
     const lowCut = new BiquadFilterNode(context, { type: "highpass", frequency: LOWEST, Q: -3 });
     limit(context, node.connect(lowCut).connect(volume)).connect(context.destination);
     await context.resume();
-    return new Player(context, node, volume);
+    return new Player(context, node);
   } catch (error) {
     await context.close();
     throw error;

@@ -20,14 +20,15 @@ export interface FootSensors {
   readonly force: ArrayLike<number>;
 }
 
-/** Time without contact after which the next contact is a landing, s. */
-const RELEASE = 0.005;
-
-/** Share of the largest friction from which on a foot slides. */
-const AT_LIMIT = 0.99;
-
-/** Radius of a foot, m. */
-const FOOT_RADIUS = 0.023;
+/** What contacts are told by. */
+export interface ContactFigures {
+  /** Time without contact after which the next contact is a landing, s. */
+  readonly release: number;
+  /** Share of the largest friction from which on a foot slides. */
+  readonly at_limit: number;
+  /** m. */
+  readonly foot_radius: number;
+}
 
 export class Recorder {
   /** Friction coefficient of what the robot stands on. */
@@ -41,10 +42,15 @@ export class Recorder {
   /**
    * @param timestep Physics step, s.
    * @param friction Friction coefficient of the floor.
+   * @param figures What contacts are told by.
    */
-  constructor(timestep: number, friction: number) {
+  constructor(
+    timestep: number,
+    friction: number,
+    private readonly figures: ContactFigures,
+  ) {
     this.friction = friction;
-    this.release = Math.max(1, Math.round(RELEASE / timestep));
+    this.release = Math.max(1, Math.round(figures.release / timestep));
     // All begin on the ground: the first contact is no landing.
     this.stood.fill(1);
   }
@@ -99,10 +105,11 @@ export class Recorder {
     const forceX = feet.force[x] as number;
     const forceY = feet.force[x + 1] as number;
     const limit = this.friction * Math.max(Math.abs(feet.force[x + 2] as number), 1e-6);
-    if (!(Math.hypot(forceX, forceY) >= AT_LIMIT * limit)) return 0;
+    if (!(Math.hypot(forceX, forceY) >= this.figures.at_limit * limit)) return 0;
     // v + w x (0, 0, -r): where the foot touches, a foot that rolls does not slide.
-    const slideX = (feet.velocity[x] as number) - (feet.angularVelocity[x + 1] as number) * FOOT_RADIUS;
-    const slideY = (feet.velocity[x + 1] as number) + (feet.angularVelocity[x] as number) * FOOT_RADIUS;
+    const radius = this.figures.foot_radius;
+    const slideX = (feet.velocity[x] as number) - (feet.angularVelocity[x + 1] as number) * radius;
+    const slideY = (feet.velocity[x + 1] as number) + (feet.angularVelocity[x] as number) * radius;
     return Math.max(forceX * slideX + forceY * slideY, 0);
   }
 }

@@ -213,8 +213,3 @@ export class Soundscape {
     }
   }
 }
-
-/** Returns a soundscape. */
-export function createSoundscape(tables: SoundTables, options: SoundscapeOptions): Soundscape {
-  return new Soundscape(tables, options);
-}

@@ -4,7 +4,7 @@
  */
 
 /** Layout that is understood here. */
-const FORMAT = 1;
+const FORMAT = 2;
 
 /** A section of a filter as scipy writes it: b0, b1, b2, 1, a1, a2. */
 export type Section = readonly number[];
@@ -79,6 +79,11 @@ export interface SoundTables {
   readonly format: number;
   /** The only one that the tables are for, Hz. */
   readonly sample_rate: number;
+  /**
+   * Sound pressure of a sample of 1, Pa, as in the WAV files of Python. Always the same, so that a quiet
+   * walk sounds quiet beside a loud one; a boarded floor under a foot has peaks of half of it.
+   */
+  readonly full_scale: number;
   readonly air: { readonly speed_of_sound: number; readonly impedance: number };
   readonly tiers: readonly TierTable[];
   readonly landing: {
@@ -130,6 +135,8 @@ export interface SoundTables {
     readonly readings_per_second: number;
     /** Time before the first reading, s. */
     readonly settling: number;
+    /** Time after the start of a walk, or a fall, that is left out of its figures, s. */
+    readonly settle_time: number;
   };
 }
 

@@ -1,7 +1,6 @@
 /** The audio thread's end of the sound. Bundled into a file of its own, which `Player` loads. */
 
 import {
-  FULL_SCALE,
   type FromProcessor,
   PROCESSOR,
   type ProcessorOptions,
@@ -24,6 +23,7 @@ const TOLD = 20;
 class SoundProcessor extends AudioWorkletProcessor {
   private readonly playback: Playback;
   private readonly readingsPerSecond: number;
+  private readonly fullScale: number;
   private silent = 0;
   private walk = 0;
 
@@ -32,18 +32,21 @@ class SoundProcessor extends AudioWorkletProcessor {
     const { tables, soundscape } = options.processorOptions;
     this.playback = new Playback(tables, { ...soundscape, sampleRate });
     this.readingsPerSecond = tables.meter.readings_per_second;
+    this.fullScale = tables.full_scale;
     this.port.onmessage = (event: MessageEvent<ToProcessor>) => this.hear(event.data);
   }
 
   private hear(message: ToProcessor): void {
     if (message.kind === "readings") this.playback.feed(message.batch);
     else if (message.kind === "surface") this.playback.setSurface(message.name);
-    else this.begin(message.walk);
+    else if (message.kind === "fall") this.playback.leaveOut();
+    else this.begin(message.walk, message.kind === "reset");
   }
 
-  private begin(walk: number): void {
+  private begin(walk: number, silent: boolean): void {
     this.walk = walk;
-    this.playback.reset();
+    if (silent) this.playback.reset();
+    else this.playback.measureAnew();
   }
 
   process(_inputs: Float32Array[][], outputs: Float32Array[][]): boolean {
@@ -52,7 +55,7 @@ class SoundProcessor extends AudioWorkletProcessor {
     if (channels === undefined || out === undefined) return true;
     this.playback.play(out);
     for (let i = 0; i < out.length; i++) {
-      out[i] = (out[i] as number) / FULL_SCALE;
+      out[i] = (out[i] as number) / this.fullScale;
     }
     for (let channel = 1; channel < channels.length; channel++) channels[channel]?.set(out);
     this.silent += out.length;

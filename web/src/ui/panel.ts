@@ -3,6 +3,7 @@
 import type { Gait } from "../control/gait_meter.js";
 import type { Levels } from "../control/hearing.js";
 import type { Axis, Command, PageData } from "../physics/page_data.js";
+import type { Ground } from "../physics/simulation.js";
 import type { Settings } from "../settings/settings.js";
 import { anyElement, button, canvas, input, output, select } from "./elements.js";
 import { Trace } from "./trace.js";
@@ -14,8 +15,7 @@ export interface PanelActions {
   push(): void;
   restart(): void;
   setFloor(name: string): void;
-  /** `flat`, or `stairs` and their level after a blank. */
-  setGround(choice: string): void;
+  setGround(ground: Ground, level: number): void;
   setController(name: string): void;
   openPolicy(file: File): void;
   toggleSound(): void;
@@ -78,6 +78,12 @@ export class Panel {
     this.note.classList.toggle("fault", isFault);
   }
 
+  /** Tells what is wrong with an address, in one line. */
+  tellFaults(faults: readonly string[]): void {
+    const more = faults.length > 1 ? ` (and ${faults.length - 1} more)` : "";
+    this.tell(`Left out: ${faults[0]}${more}.`, true);
+  }
+
   showGait(gait: Gait): void {
     anyElement("speed").textContent = figure(gait.speed, 2, "m/s");
     anyElement("landing").textContent = figure(gait.landing_speed_mean, 2, "m/s");
@@ -96,18 +102,30 @@ export class Panel {
     this.trace.add(levels.level, seconds);
   }
 
-  /** Shows whether there is sound; null where there can be none. */
-  showSound(isOn: boolean | null): void {
+  /** Shows whether there is sound, and whether that is about to change. */
+  showSound(isOn: boolean, isBusy: boolean): void {
     const toggle = button("sound");
-    toggle.disabled = isOn === null;
-    toggle.setAttribute("aria-pressed", String(isOn === true));
-    toggle.textContent = isOn === null ? "No sound here" : isOn ? "Sound off" : "Sound on";
-    if (isOn === null) button("compare").disabled = true;
+    toggle.setAttribute("aria-pressed", String(isOn));
+    toggle.textContent = isOn ? "Sound off" : isBusy ? "Sound begins…" : "Sound on";
+    // Not disabled: that would take the focus away from whoever works it by keys.
+    for (const own of [toggle, button("compare")]) own.setAttribute("aria-disabled", String(isBusy));
+  }
+
+  /** Shows that there can be no sound. */
+  showNoSound(): void {
+    button("sound").textContent = "No sound here";
+    for (const id of ["sound", "compare"]) button(id).disabled = true;
   }
 
   showComparison(text: string, isRunning: boolean): void {
     anyElement("comparison").textContent = text;
     button("compare").textContent = isRunning ? "Stop comparing" : "Compare β 0 and 1";
+    if (!isRunning) anyElement("countdown").textContent = "";
+  }
+
+  /** Shows how long a part of the comparison goes on; nobody wants that read out. */
+  showCountdown(seconds: number): void {
+    anyElement("countdown").textContent = `${seconds} s to go.`;
   }
 
   /** Shows that all is there, or says why there is nothing to see. */
@@ -132,14 +150,21 @@ export class Panel {
       share: actions.share,
     };
     for (const [id, action] of Object.entries(clicks)) {
-      button(id).addEventListener("click", () => action.call(actions));
+      const own = button(id);
+      own.addEventListener("click", () => {
+        if (own.getAttribute("aria-disabled") !== "true") action.call(actions);
+      });
     }
     onChange(select("floor"), (value) => actions.setFloor(value));
-    onChange(select("ground"), (value) => actions.setGround(value));
+    onChange(select("ground"), (value) => {
+      const [ground, level = "0"] = value.split(" ");
+      actions.setGround(ground as Ground, Number(level));
+    });
     onChange(select("controller"), (value) => actions.setController(value));
     const file = input("file");
     file.addEventListener("change", () => {
-      if (file.files?.length) actions.openPolicy(file.files[0]);
+      const chosen = file.files?.[0];
+      if (chosen) actions.openPolicy(chosen);
       file.value = "";
     });
   }

@@ -6,17 +6,11 @@ const HIGHEST = 85;
 const GRID = 10;
 
 export class Trace {
-  private readings: [time: number, level: number][] = [];
+  private readonly readings: [time: number, level: number][] = [];
   private now = 0;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
     new ResizeObserver(() => this.draw()).observe(canvas);
-  }
-
-  /** Forgets the past. */
-  clear(): void {
-    this.readings = [];
-    this.draw();
   }
 
   /** Takes a level, dBA, `seconds` after the last one. */

@@ -3,7 +3,7 @@
 import { LevelMeter } from "../../src/sound/level_meter";
 import type { SoundscapeOptions } from "../../src/sound/options";
 import { READINGS_LENGTH, viewReadings } from "../../src/sound/readings";
-import { createSoundscape } from "../../src/sound/soundscape";
+import { Soundscape } from "../../src/sound/soundscape";
 import type { SoundTables } from "../../src/sound/tables";
 import { bandSquares, decibels } from "./spectrum";
 import type { Figures } from "./walks";
@@ -14,7 +14,7 @@ export function hear(
   readings: Float32Array,
   options: SoundscapeOptions,
 ): Float32Array {
-  const soundscape = createSoundscape(tables, options);
+  const soundscape = new Soundscape(tables, options);
   const steps = readings.length / READINGS_LENGTH;
   const samples = Math.round((options.timestep ?? 0.001) * tables.sample_rate);
   const sound = new Float32Array(steps * samples);

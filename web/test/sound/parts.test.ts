@@ -2,6 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { contactFigures } from "../../src/physics/page_data";
 import { Blow } from "../../src/sound/blow";
 import { placeStruck } from "../../src/sound/landings";
 import { LevelMeter } from "../../src/sound/level_meter";
@@ -9,6 +10,7 @@ import { Microphone } from "../../src/sound/microphone";
 import { FEET, READINGS_LENGTH, viewReadings } from "../../src/sound/readings";
 import { Recorder } from "../../src/sound/recorder";
 import { type FloorTable, type LawTable, loadSoundTables } from "../../src/sound/tables";
+import { page } from "../files";
 import { readReferences, readSensors, readTables } from "./walks";
 
 const references = readReferences();
@@ -17,7 +19,7 @@ const tables = readTables();
 test("the recorder finds the landings and the sliding that Python's finds", () => {
   const rows = readSensors();
   const width = FEET + 4 * 3 * FEET;
-  const recorder = new Recorder(references.timestep, references.recorded.friction);
+  const recorder = new Recorder(references.timestep, references.recorded.friction, contactFigures(page));
   const into = viewReadings();
   const sliding: number[][] = [];
   const landings: number[][] = [];
@@ -59,7 +61,7 @@ function assertRows(found: number[][], wanted: readonly (readonly number[])[]): 
 }
 
 test("a robot that begins anew does not land at once, and a foot that bounces does not either", () => {
-  const recorder = new Recorder(0.001, 0.8);
+  const recorder = new Recorder(0.001, 0.8, contactFigures(page));
   const into = viewReadings();
   const zeros = new Float32Array(12);
   const falling = Float32Array.from({ length: 12 }, (_, i) => (i % 3 === 2 ? -0.4 : 0));
@@ -161,9 +163,9 @@ test("a blow passes its impulse, wherever between samples it begins and at whate
 
 test("tables of another format, and a file that is cut off, are refused in a line", () => {
   const empty = new ArrayBuffer(0);
-  assert.throws(() => loadSoundTables({ format: 99 }, empty), /format 99, not 1/);
+  assert.throws(() => loadSoundTables({ format: 99 }, empty), /format 99, not 2/);
   assert.throws(() => loadSoundTables(null, empty), /format undefined/);
-  const cut = { format: 1, yields: { shape: [4], offset: 0 } };
+  const cut = { format: 2, yields: { shape: [4], offset: 0 } };
   assert.throws(() => loadSoundTables(cut, empty), /end before the last array/);
 });
 

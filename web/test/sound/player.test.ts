@@ -2,8 +2,8 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { FULL_SCALE, type FromProcessor, PROCESSOR, type ToProcessor } from "../../src/sound/messages";
-import { Player, startPlayer } from "../../src/sound/player";
+import { type FromProcessor, PROCESSOR, type ToProcessor } from "../../src/sound/messages";
+import { openContext, Player, startPlayer } from "../../src/sound/player";
 import { Playback } from "../../src/sound/playback";
 import { READINGS_LENGTH } from "../../src/sound/readings";
 import { readReferences, readTables, readWalk } from "./walks";
@@ -52,7 +52,7 @@ test("what the player is fed is played in shares of the full scale, and its leve
   const processor = await makeProcessor();
   const port = new Port<ToProcessor>();
   const told: FromProcessor[] = [];
-  const player = new Player({} as AudioContext, { port } as unknown as AudioWorkletNode, {} as GainNode);
+  const player = new Player({} as AudioContext, { port } as unknown as AudioWorkletNode);
   player.onLevels = (levels) => told.push(levels as FromProcessor);
   /** Delivers what either end has sent. */
   const deliver = () => {
@@ -70,7 +70,7 @@ test("what the player is fed is played in shares of the full scale, and its leve
       for (let block = 0; block < 7; block++) {
         assert.ok(processor.process([], [[...stereo]]));
         playback.play(wanted);
-        wanted.forEach((own, i) => assert.equal(stereo[1][i], Math.fround(own / FULL_SCALE)));
+        wanted.forEach((own, i) => assert.equal(stereo[1][i], Math.fround(own / tables.full_scale)));
         assert.deepEqual(stereo[0], stereo[1]);
       }
     }
@@ -100,7 +100,7 @@ test("a part of an array is copied, and a whole one given away", () => {
   const port = {
     postMessage: (_: ToProcessor, transfer: ArrayBuffer[]) => given.push(...transfer),
   };
-  const player = new Player({} as AudioContext, { port } as unknown as AudioWorkletNode, {} as GainNode);
+  const player = new Player({} as AudioContext, { port } as unknown as AudioWorkletNode);
   const whole = steps(0, 2);
   player.feed(whole);
   player.feed(whole.subarray(0, READINGS_LENGTH));
@@ -109,16 +109,30 @@ test("a part of an array is copied, and a whole one given away", () => {
   assert.equal(given[1]?.byteLength, 4 * READINGS_LENGTH);
 });
 
-test("a browser without Web Audio, or where it is not safe, is told of in a line", async () => {
-  await assert.rejects(startPlayer(tables, "worklet.js", { surface: "wood" }), /no Web Audio/);
-  let closed = false;
-  Object.assign(globalThis, {
-    AudioContext: class {
-      async close(): Promise<void> {
-        closed = true;
-      }
-    },
-  });
-  await assert.rejects(startPlayer(tables, "worklet.js", { surface: "wood" }), /https or localhost/);
-  assert.ok(closed, "the context is left open");
+/** A context as a browser has it where worklets are not allowed. */
+class Bare {
+  closed = 0;
+  resumed = 0;
+  async resume(): Promise<void> {
+    this.resumed++;
+  }
+  async close(): Promise<void> {
+    this.closed++;
+  }
+}
+
+test("a browser without Web Audio is told of in a line", () => {
+  assert.throws(() => openContext(tables.sample_rate), /no Web Audio/);
+});
+
+test("a context runs from the gesture on, and is closed where anything is missing", async () => {
+  Object.assign(globalThis, { AudioContext: Bare });
+  const context = openContext(tables.sample_rate);
+  const bare = context as unknown as Bare;
+  assert.equal(bare.resumed, 1);
+  await assert.rejects(startPlayer(context, tables, "worklet.js", { surface: "wood" }), /https or localhost/);
+  assert.equal(bare.closed, 1);
+  const missing = Promise.reject(new Error("sound.bin cannot be loaded (404)"));
+  await assert.rejects(startPlayer(context, missing, "worklet.js", { surface: "wood" }), /sound\.bin/);
+  assert.equal(bare.closed, 2);
 });

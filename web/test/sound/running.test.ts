@@ -5,7 +5,7 @@ import { test } from "node:test";
 import { LevelMeter } from "../../src/sound/level_meter";
 import { Playback } from "../../src/sound/playback";
 import { READINGS_LENGTH, viewReadings } from "../../src/sound/readings";
-import { createSoundscape, type Soundscape } from "../../src/sound/soundscape";
+import { Soundscape } from "../../src/sound/soundscape";
 import { readReferences, readTables, readWalk } from "./walks";
 
 const references = readReferences();
@@ -67,7 +67,7 @@ function standing(count: number): Float32Array {
 test("a stand is the fan's 55 dBA at the trunk, and its 1/r elsewhere", () => {
   const still = standing(2000);
   const heard = (options: object) => {
-    const soundscape = createSoundscape(tables, { surface: "wood", seed: 2, ...options });
+    const soundscape = new Soundscape(tables, { surface: "wood", seed: 2, ...options });
     const out = new Float32Array(2000 * STEP);
     for (let step = 0; step < 2000; step++) {
       soundscape.step(viewReadings(still, step));
@@ -86,7 +86,7 @@ test("a landing sounds the same at other physics steps", () => {
   viewReadings(landing).landingMass[2] = 0.6;
   const still = standing(1);
   const [fine, coarse] = [0.001, 0.002].map((timestep) => {
-    const soundscape = createSoundscape(tables, { surface: "tile", timestep, sources: ["impacts", "body"] });
+    const soundscape = new Soundscape(tables, { surface: "tile", timestep, sources: ["impacts", "body"] });
     soundscape.step(viewReadings(landing));
     for (let time = timestep; time < 0.3; time += timestep) soundscape.step(viewReadings(still));
     const out = new Float32Array(0.3 * 48000);
@@ -101,7 +101,7 @@ test("a landing sounds the same at other physics steps", () => {
 });
 
 test("another floor is heard from the next landing on, and the old one rings out", () => {
-  const soundscape = createSoundscape(tables, { surface: "wood", sources: ["impacts"] });
+  const soundscape = new Soundscape(tables, { surface: "wood", sources: ["impacts"] });
   const before = render(soundscape, 0, 1200);
   soundscape.setSurface("carpet");
   const ringing = render(soundscape, 1200, 800);
@@ -115,7 +115,7 @@ test("another floor is heard from the next landing on, and the old one rings out
 });
 
 test("beginning anew is silent but for the fan, and does not click", () => {
-  const soundscape = createSoundscape(tables, { surface: "wood", sources: ["impacts", "body", "drive"] });
+  const soundscape = new Soundscape(tables, { surface: "wood", sources: ["impacts", "body", "drive"] });
   const before = render(soundscape, 0, 700);
   soundscape.reset();
   assert.equal(soundscape.queued, 0);
@@ -132,7 +132,7 @@ test("beginning anew is silent but for the fan, and does not click", () => {
 });
 
 test("where readings run out it fades within milliseconds, and goes on without a click", () => {
-  const soundscape = createSoundscape(tables, { surface: "wood" });
+  const soundscape = new Soundscape(tables, { surface: "wood" });
   const before = render(soundscape, 0, 500);
   const gap = new Float32Array(4800);
   assert.equal(soundscape.render(gap), 0);
@@ -142,7 +142,7 @@ test("where readings run out it fades within milliseconds, and goes on without a
 });
 
 test("a simulation that blew up is not heard, and what comes after it is", () => {
-  const soundscape = createSoundscape(tables, { surface: "wood" });
+  const soundscape = new Soundscape(tables, { surface: "wood" });
   const before = level(render(soundscape, 0, 1000));
   const broken = viewReadings();
   for (const value of [NaN, Infinity]) {
@@ -154,7 +154,7 @@ test("a simulation that blew up is not heard, and what comes after it is", () =>
 });
 
 test("of too many steps the oldest go", () => {
-  const soundscape = createSoundscape(tables, { surface: "wood" });
+  const soundscape = new Soundscape(tables, { surface: "wood" });
   for (let step = 0; step < 1700; step++) soundscape.step(viewReadings(walk, step));
   assert.equal(soundscape.queued, soundscape.room);
 });
@@ -250,4 +250,35 @@ test("the audio thread makes no arrays as it plays", () => {
   }
   assert.deepEqual(made, []);
   assert.ok(playback.meter.level > 50, "nothing was played");
+});
+
+test("what a robot does after a fall is in no figure until it walks again, and what was before stays", () => {
+  const playback = new Playback(tables, { surface: "wood" });
+  const out = new Float32Array(STEP);
+  /** Plays seconds of the walk, or of one that is ten times as loud. */
+  const play = (seconds: number, loud = false) => {
+    for (let step = 0; step < 1000 * seconds; step++) {
+      const batch = steps(step % walked, 1);
+      if (loud) viewReadings(batch).jointTorque.forEach((own, i, all) => (all[i] = 10 * own));
+      playback.feed(batch);
+      playback.play(out);
+    }
+  };
+  play(4);
+  const { mnl, pnl, readings } = playback.meter;
+  assert.ok(readings > 30, `${readings} readings`);
+  playback.leaveOut();
+  play(1.4, true);
+  assert.deepEqual(
+    [playback.meter.mnl, playback.meter.pnl, playback.meter.readings],
+    [mnl, pnl, readings],
+  );
+  play(1);
+  assert.ok(playback.meter.readings > readings + 5);
+  playback.measureAnew();
+  assert.ok(Number.isNaN(playback.meter.mnl));
+  play(1.4);
+  assert.equal(playback.meter.readings, 0);
+  play(0.5);
+  assert.ok(playback.meter.mnl > 55);
 });

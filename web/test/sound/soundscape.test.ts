@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { SOURCES, type Source } from "../../src/sound/options";
 import { READINGS_LENGTH, viewReadings } from "../../src/sound/readings";
-import { createSoundscape } from "../../src/sound/soundscape";
+import { Soundscape } from "../../src/sound/soundscape";
 import { figures, hear } from "./heard";
 import { decibels } from "./spectrum";
 import { type Figures, readReferences, readTables, readWalk } from "./walks";
@@ -144,7 +144,7 @@ test("equal seeds give equal sound, others other noise of the same level", () =>
 test("sound does not depend on the lengths in which it is rendered", () => {
   const readings = readWalk("wood-0", references).subarray(0, 300 * READINGS_LENGTH);
   const whole = hear(tables, readings, { surface: "wood" });
-  const soundscape = createSoundscape(tables, { surface: "wood" });
+  const soundscape = new Soundscape(tables, { surface: "wood" });
   const parts = new Float32Array(whole.length);
   for (let step = 0; step < 300; step++) soundscape.step(viewReadings(readings, step));
   const lengths = [1, 128, 7, 480, 50];
@@ -157,7 +157,7 @@ test("sound does not depend on the lengths in which it is rendered", () => {
 });
 
 test("bad options are refused by name", () => {
-  const make = (options: object) => () => createSoundscape(tables, { surface: "wood", ...options });
+  const make = (options: object) => () => new Soundscape(tables, { surface: "wood", ...options });
   assert.throws(make({ surface: "lava" }), /lava.*wood, parquet, laminate, carpet, tile, concrete/);
   assert.throws(make({ sampleRate: 44100 }), /sampleRate must be 48000 Hz, got 44100/);
   assert.throws(make({ timestep: 0.0011 }), /timestep must be a multiple/);
