@@ -39,11 +39,7 @@ export class App implements PanelActions {
     simulation.setGround(settings.ground, settings.level);
     const sound = new SoundSwitch(simulation, first.decimation, page, startHearing, panel);
     this.live = new LiveWalk(simulation, first, page, picture, sound);
-    this.comparing = new Comparing(this.live, this.steering, {
-      showComparison: (text, isRunning) => panel.showComparison(text, isRunning),
-      showCountdown: (seconds) => panel.showCountdown(seconds),
-      show: () => this.show(),
-    });
+    this.comparing = new Comparing(this.live, this.steering, panel, () => this.show());
     this.drivers = new Drivers(
       parts.shelf,
       panel,
@@ -97,7 +93,7 @@ export class App implements PanelActions {
       gait: live.gait,
       levels: live.sound.levels,
       isHearing: live.sound.isOn,
-      camera: parts.picture?.view ?? null,
+      camera: parts.picture?.orbit.place ?? null,
     };
   }
 
@@ -175,6 +171,10 @@ export class App implements PanelActions {
 
   compare(): void {
     this.comparing.toggle();
+  }
+
+  turnCamera(around: number, up: number, away: number): void {
+    this.parts.picture?.orbit.turn(around, up, away);
   }
 
   share(): void {

@@ -11,8 +11,6 @@ import { Latest } from "./support/latest.js";
 export interface ComparisonShown {
   showComparison(text: string, isRunning: boolean): void;
   showCountdown(seconds: number): void;
-  /** The command changed. */
-  show(): void;
 }
 
 export class Comparing {
@@ -21,10 +19,17 @@ export class Comparing {
   private readonly asked = new Latest();
   private before: Command;
 
+  /**
+   * @param live What walks, and is heard.
+   * @param steering What it is asked to do.
+   * @param shown Where it is told how it goes.
+   * @param showCommand Shows a command that changed.
+   */
   constructor(
     private readonly live: LiveWalk,
     private readonly steering: Steering,
-    private readonly shown: ComparisonShown,
+    shown: ComparisonShown,
+    private readonly showCommand: () => void,
   ) {
     this.before = steering.command;
     this.comparison = new Comparison({
@@ -65,13 +70,13 @@ export class Comparing {
 
   private begin(beta: number): void {
     this.steering.set({ beta });
-    this.shown.show();
+    this.showCommand();
     this.live.begin();
   }
 
   private end(): void {
     this.steering.set(this.before);
     this.live.measureAnew();
-    this.shown.show();
+    this.showCommand();
   }
 }

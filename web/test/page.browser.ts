@@ -213,6 +213,60 @@ test("a robot that comes stopped by its address goes at a click", async () => {
   await leave(opened);
 });
 
+test("the camera turns by hand, by the wheel and by keys", async () => {
+  const opened = await site.visit();
+  const { page } = opened;
+  const camera = async () => (await stateOf(page)).camera!;
+  const first = await camera();
+  const box = (await page.locator("#view").boundingBox())!;
+  const [x, y] = [box.x + 0.5 * box.width, box.y + 0.5 * box.height];
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.mouse.move(x + 100, y + 50);
+  await page.mouse.up();
+  const dragged = await camera();
+  assert.ok(Math.abs(dragged.azimuth - first.azimuth + 0.8) < 1e-6, JSON.stringify(dragged));
+  assert.ok(Math.abs(dragged.elevation - first.elevation - 0.3) < 1e-6);
+  await page.mouse.move(x - 100, y);
+  assert.deepEqual(await camera(), dragged);
+  await page.mouse.wheel(0, 300);
+  await page.waitForFunction(
+    (old) => globalThis.mute!.app.state.camera!.distance > 1.3 * old,
+    first.distance,
+  );
+  const wheeled = await camera();
+  for (const key of ["KeyL", "KeyL", "KeyI", "KeyU"]) await page.keyboard.press(key);
+  const turned = await camera();
+  assert.ok(Math.abs(turned.azimuth - wheeled.azimuth - 0.2) < 1e-9);
+  assert.ok(Math.abs(turned.elevation - wheeled.elevation - 0.1) < 1e-9);
+  assert.ok(turned.distance < wheeled.distance);
+  for (const key of ["KeyJ", "KeyJ", "KeyK", "KeyO"]) await page.keyboard.press(key);
+  const back = await camera();
+  assert.ok(Math.abs(back.azimuth - wheeled.azimuth) < 1e-9);
+  assert.ok(Math.abs(back.distance - wheeled.distance) < 1e-9);
+  await page.selectOption("#ground", "stairs 0");
+  assert.notEqual((await camera()).azimuth, back.azimuth);
+  await leave(opened);
+});
+
+test("what gets the focus on a small screen is not behind the picture", async () => {
+  const opened = await site.visit({ viewport: { width: 360, height: 740 } });
+  const { page } = opened;
+  await page.evaluate(() => window.scrollTo(0, document.body.scrollHeight));
+  await page.focus("#share");
+  for (let i = 0; i < 14; i++) {
+    await page.keyboard.press("Shift+Tab");
+    const [top, floor, id] = await page.evaluate(() => {
+      const own = document.activeElement!;
+      const stage = document.getElementById("stage")!.getBoundingClientRect();
+      return [own.getBoundingClientRect().top, stage.bottom, own.id] as const;
+    });
+    if (!id) break; // before the first control
+    assert.ok(top >= floor - 1, `#${id} is at ${top} px, the picture ends at ${floor}`);
+  }
+  await leave(opened);
+});
+
 /** Drops a file on the page, as a hand would. */
 async function drop(page: Page, name: string, content: Uint8Array): Promise<void> {
   const base64 = Buffer.from(content).toString("base64");

@@ -1,4 +1,4 @@
-/** Keys, which do what they do in the window of `play.py`, and WASD beside the arrows. */
+/** Keys, which do what they do in the window of `play.py`; WASD beside the arrows, and the camera's. */
 
 import type { Axis } from "../physics/page_data.js";
 
@@ -8,6 +8,8 @@ export interface KeyActions {
   stopOrGo(): void;
   restart(): void;
   push(): void;
+  /** Angles, rad, and the logarithm of a factor of the distance. */
+  turnCamera(around: number, up: number, away: number): void;
 }
 
 const STEP = 0.1;
@@ -27,6 +29,16 @@ const STEPS: Readonly<Record<string, readonly [Axis, number]>> = {
   KeyV: ["beta", -STEP],
 };
 
+/** Of the camera: around, up and away. */
+const TURNS: Readonly<Record<string, readonly [number, number, number]>> = {
+  KeyJ: [-0.1, 0, 0],
+  KeyL: [0.1, 0, 0],
+  KeyI: [0, 0.1, 0],
+  KeyK: [0, -0.1, 0],
+  KeyU: [0, 0, -0.1],
+  KeyO: [0, 0, 0.1],
+};
+
 /** Begins to listen; whoever types into a field, or works a control, is left alone. */
 export function listenToKeys(target: EventTarget, actions: KeyActions): void {
   target.addEventListener("keydown", (raw) => {
@@ -38,7 +50,9 @@ export function listenToKeys(target: EventTarget, actions: KeyActions): void {
 
 function press(event: KeyboardEvent, actions: KeyActions): boolean {
   const step = STEPS[event.code];
+  const turn = TURNS[event.code];
   if (step) actions.change(...step);
+  else if (turn) actions.turnCamera(...turn);
   else if (event.repeat) return false;
   else if (event.code === "Space") actions.stopOrGo();
   else if (event.code === "KeyR") actions.restart();

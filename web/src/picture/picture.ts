@@ -11,7 +11,6 @@ import {
   Fog,
   HemisphereLight,
   PCFShadowMap,
-  PerspectiveCamera,
   Quaternion,
   Scene,
   Vector3,
@@ -21,26 +20,22 @@ import {
 import { compile, type MainModule } from "../physics/mujoco.js";
 import type { Simulation } from "../physics/simulation.js";
 import { GroundPicture, ShadowSpot } from "./ground.js";
+import { Orbit } from "./orbit.js";
 import { drawsInSoftware, PixelBudget } from "./pixel_budget.js";
 import { buildRobot } from "./robot.js";
 
 const TRUNK = 1;
 
-/** Azimuth of the camera, rad. */
-const FROM_THE_FRONT = -0.9;
-
 export class Picture {
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(40, 1, 0.05, 100);
+  readonly orbit = new Orbit();
   private readonly ground: GroundPicture;
   private readonly spot = new ShadowSpot();
   private readonly sun = new DirectionalLight(0xffffff, 2.2);
   private readonly robot;
   private readonly budget: PixelBudget;
   private readonly poses: [Pose, Pose];
-  /** Where the camera looks from, beside the robot: rad, rad and m. */
-  readonly view = { azimuth: FROM_THE_FRONT, elevation: 0.3, distance: 1.9 };
   private readonly target = new Vector3(0, 0, 0.25);
   private size = { width: 1, height: 1 };
 
@@ -70,7 +65,7 @@ export class Picture {
     model.delete();
     this.poses = [new Pose(bodies), new Pose(bodies)];
     this.furnish();
-    this.listenToHand();
+    this.orbit.listen(canvas);
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
   }
@@ -94,7 +89,7 @@ export class Picture {
 
   /** Looks from where one sees what lies ahead: on stairs from behind, else from the front. */
   lookAhead(simulation: Simulation): void {
-    this.view.azimuth = simulation.flights ? -2.3 : FROM_THE_FRONT;
+    this.orbit.lookAhead(simulation.flights !== null);
   }
 
   /** Draws with another floor's colour from now on. */
@@ -122,8 +117,8 @@ export class Picture {
     this.spot.position.set(trunk.x, trunk.y, simulation.groundHeight(trunk.x) + 0.004);
     this.sun.position.copy(trunk).add(new Vector3(1.2, -1.6, 4));
     this.sun.target.position.copy(trunk);
-    this.placeCamera();
-    this.renderer.render(this.scene, this.camera);
+    this.orbit.lookAt(this.target);
+    this.renderer.render(this.scene, this.orbit.camera);
   }
 
   /** Triangles and calls of the last picture, for measurements. */
@@ -144,18 +139,6 @@ export class Picture {
     hemisphere.position.set(0, 0, 1);
     this.scene.add(this.ground, this.robot, this.spot, this.sun, this.sun.target, hemisphere);
     this.scene.add(new AmbientLight(0xffffff, 0.35));
-    this.camera.up.set(0, 0, 1);
-  }
-
-  private placeCamera(): void {
-    const { azimuth, elevation, distance } = this.view;
-    const level = distance * Math.cos(elevation);
-    this.camera.position.set(
-      this.target.x + level * Math.cos(azimuth),
-      this.target.y + level * Math.sin(azimuth),
-      Math.max(this.target.z + distance * Math.sin(elevation), 0.1),
-    );
-    this.camera.lookAt(this.target);
   }
 
   private resize(): void {
@@ -166,27 +149,9 @@ export class Picture {
     this.renderer.shadowMap.enabled = this.sun.castShadow = this.budget.shadows;
     this.spot.visible = !this.budget.shadows;
     this.renderer.setSize(this.size.width, this.size.height, false);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
-  }
-
-  /** Dragging turns the camera, the wheel brings it nearer. */
-  private listenToHand(): void {
-    const { canvas, view } = this;
-    canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
-    canvas.addEventListener("pointermove", (event) => {
-      if (!canvas.hasPointerCapture(event.pointerId)) return;
-      view.azimuth -= 0.008 * event.movementX;
-      view.elevation = clamp(view.elevation + 0.006 * event.movementY, -0.05, 1.4);
-    });
-    canvas.addEventListener(
-      "wheel",
-      (event) => {
-        event.preventDefault();
-        view.distance = clamp(view.distance * Math.exp(0.001 * event.deltaY), 0.8, 6);
-      },
-      { passive: false },
-    );
+    const { camera } = this.orbit;
+    camera.aspect = width / height;
+    camera.updateProjectionMatrix();
   }
 }
 
@@ -216,8 +181,4 @@ class Pose {
       turn.set(x, y, z, w);
     });
   }
-}
-
-function clamp(value: number, low: number, high: number): number {
-  return Math.min(Math.max(value, low), high);
 }
