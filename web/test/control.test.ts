@@ -155,6 +155,46 @@ test("a machine that draws slowly is given less to draw, one that keeps up is no
   assert.ok(quick.shadows);
 });
 
+/** Draws for some seconds at a rate that hangs on how finely; returns how often that changed. */
+function drawFor(budget: PixelBudget, seconds: number, rate: (share: number) => number): number {
+  let changes = 0;
+  for (let time = 0; time < seconds; ) {
+    const period = 1 / rate(budget.ratio(1));
+    time += period;
+    if (budget.after(period)) changes++;
+  }
+  return changes;
+}
+
+test("a screen of 30 pictures a second is drawn on as finely as any", () => {
+  const budget = new PixelBudget(false);
+  assert.equal(drawFor(budget, 60, () => 30), 0);
+  assert.deepEqual([budget.ratio(1), budget.shadows], [1, true]);
+});
+
+test("a machine that was busy for a while draws finely again after it", () => {
+  const budget = new PixelBudget(false);
+  drawFor(budget, 20, () => 10);
+  assert.ok(budget.ratio(1) < 0.5);
+  drawFor(budget, 60, () => 60);
+  assert.deepEqual([budget.ratio(1), budget.shadows], [1, true]);
+  const software = new PixelBudget(true);
+  const first = software.ratio(1);
+  drawFor(software, 20, () => 10);
+  drawFor(software, 60, () => 60);
+  assert.equal(software.ratio(1), first, "more than it began with is not tried without a card");
+});
+
+test("a machine that is too slow for more tries it ever more rarely", () => {
+  const budget = new PixelBudget(false);
+  const rate = (share: number) => (share > 0.6 ? 20 : 60);
+  drawFor(budget, 10, rate);
+  const early = drawFor(budget, 100, rate);
+  const late = drawFor(budget, 400, rate);
+  assert.ok(early >= 4 && early <= 8, `${early} changes in the first 100 s`);
+  assert.ok(late <= 6, `${late} changes in the next 400 s`);
+});
+
 /** A comparison, and all that it tells. */
 function comparing() {
   const told: string[] = [];

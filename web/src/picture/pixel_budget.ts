@@ -1,11 +1,18 @@
 /** How finely to draw: as the screen is, or more coarsely where the machine cannot keep up. */
 
-/** Longest mean time between pictures that is good enough, s. */
-const SLOWEST = 1 / 40;
+/** Longest mean time between pictures that is good enough, s: screens with 30 a second are. */
+const SLOWEST = 1 / 28;
 
-/** Pictures that are looked at together, and the time that is long enough for fewer. */
+/** Pictures that are looked at together, and the time that is long enough for fewer, s. */
 const COUNT = 24;
 const SPAN = 1.5;
+
+/**
+ * Time that goes well before drawing more finely is tried, s. It doubles each time that this was too
+ * much, up to some minutes, so that who has found its way is left in peace.
+ */
+const PATIENCE = 8;
+const MOST_PATIENCE = 256;
 
 /** A way to draw. */
 interface Fineness {
@@ -14,34 +21,41 @@ interface Fineness {
   readonly shadows: boolean;
 }
 
+const FINEST: Fineness = { share: 1, shadows: true };
 const STEPS: readonly Fineness[] = [
-  { share: 1, shadows: true },
+  FINEST,
   { share: 0.75, shadows: true },
   { share: 0.7, shadows: false },
   { share: 0.5, shadows: false },
   { share: 0.35, shadows: false },
 ];
 
-/** Where machines begin that draw without a graphics card. */
+/** Where machines begin, and stay, that draw without a graphics card. */
 const WITHOUT_CARD = 3;
 
 export class PixelBudget {
+  private readonly first: number;
   private step: number;
   private sum = 0;
   private pictures = 0;
+  /** Time that went well since the last change, and what it takes to try more, s. */
+  private good = 0;
+  private patience = PATIENCE;
+  /** Whether the last change was to more. */
+  private tries = false;
 
   /** @param software Whether the browser draws without a graphics card. */
   constructor(software: boolean) {
-    this.step = software ? WITHOUT_CARD : 0;
+    this.first = this.step = software ? WITHOUT_CARD : 0;
   }
 
   /** Returns pixels drawn for each of the page's. */
   ratio(screen: number): number {
-    return Math.min(screen, 2) * STEPS[this.step].share;
+    return Math.min(screen, 2) * this.now.share;
   }
 
   get shadows(): boolean {
-    return STEPS[this.step].shadows;
+    return this.now.shadows;
   }
 
   /** Forgets what was: after a pause, say. */
@@ -57,11 +71,31 @@ export class PixelBudget {
   after(seconds: number): boolean {
     this.sum += seconds;
     if (++this.pictures < COUNT && this.sum < SPAN) return false;
-    const slow = this.sum / this.pictures > SLOWEST;
+    const { sum } = this;
+    const slow = sum / this.pictures > SLOWEST;
     this.forget();
-    if (!slow || this.step === STEPS.length - 1) return false;
-    this.step++;
-    return true;
+    return slow ? this.draw(1) : this.tryMore(sum);
+  }
+
+  private tryMore(seconds: number): boolean {
+    this.good += seconds;
+    if (this.good < this.patience) return false;
+    // What it tried last is no trial any more.
+    this.tries = false;
+    return this.draw(-1);
+  }
+
+  private draw(change: 1 | -1): boolean {
+    const before = this.step;
+    this.step = Math.min(Math.max(this.step + change, this.first), STEPS.length - 1);
+    this.good = 0;
+    if (change > 0 && this.tries) this.patience = Math.min(2 * this.patience, MOST_PATIENCE);
+    this.tries = change < 0 && this.step !== before;
+    return this.step !== before;
+  }
+
+  private get now(): Fineness {
+    return STEPS[this.step] ?? FINEST;
   }
 }
 
