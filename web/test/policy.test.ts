@@ -3,7 +3,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
+import { readOnnx } from "../src/policy/onnx_file.js";
 import { Policy, PolicyError } from "../src/policy/policy.js";
+import { fields } from "../src/policy/protobuf.js";
+import { PolicyShelf } from "../src/policy/shelf.js";
 import { asset, page, reference } from "./files.js";
 
 const robot = { jointNames: page.joint_names, timestep: 0.001 };
@@ -63,4 +66,52 @@ test("foreign files are refused, each in one line", () => {
   const other = { ...robot, jointNames: ["knee"] };
   assert.match(refusal(shipped(), other), /other joint_names/);
   assert.match(refusal(shipped(), { ...robot, timestep: 0.003 }), /control_dt is no multiple/);
+});
+
+/** Returns a field of a message, of bytes. */
+function field(number: number, content: Uint8Array): Uint8Array {
+  const varint = (value: number): number[] =>
+    value < 0x80 ? [value] : [(value & 0x7f) | 0x80, ...varint(Math.floor(value / 0x80))];
+  return Uint8Array.from([...varint(8 * number + 2), ...varint(content.length), ...content]);
+}
+
+const letters = (word: string) => new TextEncoder().encode(word);
+
+/** Returns the policy that ships with more nodes: operator, inputs and output of each. */
+function withNodes(...nodes: (readonly [string, readonly string[], string])[]): Uint8Array {
+  const more = nodes.map(([operator, inputs, output]) => {
+    const parts = [...inputs.map((name) => field(1, letters(name))), field(2, letters(output))];
+    return field(1, Buffer.concat([...parts, field(4, letters(operator))]));
+  });
+  const parts = [...fields(shipped())].map(({ number, integer, bytes }) => {
+    if (number === 7) return field(7, Buffer.concat([bytes, ...more]));
+    return bytes.length ? field(number, bytes) : Uint8Array.of(8 * number, integer);
+  });
+  return new Uint8Array(Buffer.concat(parts));
+}
+
+test("a policy that would take too long for a control step is refused, one with some more to do is not", () => {
+  const { nodes, constants } = readOnnx(shipped());
+  const wide = [...constants].find(([, { data }]) => data.length > 20_000)?.[0] ?? "";
+  assert.ok(wide && nodes.length > 5);
+  const adding = (count: number) =>
+    withNodes(
+      ...Array.from({ length: count }, (_, i) => ["Add", [wide, wide], `more ${i}`] as const),
+    );
+  assert.equal(refusal(adding(3)), "");
+  assert.match(refusal(adding(200)), /a control step of it takes too long/);
+});
+
+test("a file that is too large is refused before it is read", async () => {
+  const shelf = new PolicyShelf(page.controllers, robot, async () => shipped());
+  let reads = 0;
+  const file = {
+    size: 40 << 20,
+    arrayBuffer: async () => {
+      reads++;
+      return new ArrayBuffer(0);
+    },
+  };
+  await assert.rejects(shelf.add("large.onnx", file as unknown as Blob), /larger than 32 MB/);
+  assert.equal(reads, 0);
 });

@@ -43,7 +43,13 @@ const WIDTHS: Readonly<Record<keyof Observation, number>> = {
 
 const COMMAND_NAMES = "lin_vel_x,lin_vel_y,ang_vel_z,beta";
 
+/** Bytes of the largest file that is read. */
 const LARGEST_FILE = 32 * 1024 * 1024;
+
+/** @throws PolicyError If a file has too many bytes, which is known before it is read. */
+export function checkSize(bytes: number): void {
+  if (bytes > LARGEST_FILE) throw new PolicyError("it is larger than 32 MB");
+}
 
 export class Policy {
   /** N m/rad, of each joint. */
@@ -75,7 +81,7 @@ export class Policy {
    * @throws PolicyError If it is anything else.
    */
   constructor(file: Uint8Array, robot: Robot) {
-    if (file.length > LARGEST_FILE) throw new PolicyError("it is larger than 32 MB");
+    checkSize(file.length);
     try {
       const onnx = readOnnx(file);
       const metadata = new Metadata(onnx.metadata);

@@ -1,7 +1,7 @@
 /** The policies that may drive: those of the page, loaded once they are wanted, and the visitor's. */
 
 import type { ControllerEntry } from "../physics/page_data.js";
-import { Policy, type Robot } from "./policy.js";
+import { checkSize, Policy, type Robot } from "./policy.js";
 
 export class PolicyShelf {
   private readonly policies = new Map<string, Policy>();
@@ -41,6 +41,7 @@ export class PolicyShelf {
    * @throws PolicyError If it is none.
    */
   async add(name: string, file: Blob): Promise<Policy> {
+    checkSize(file.size);
     return this.put(name, new Uint8Array(await file.arrayBuffer()));
   }
 
