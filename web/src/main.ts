@@ -4,7 +4,7 @@ import { App } from "./app.js";
 import { makeConsole } from "./console.js";
 import { fetchFile, fileOf, load, loadBytes, type Loaded } from "./load.js";
 import { Simulation } from "./physics/simulation.js";
-import { Picture } from "./picture/picture.js";
+import { hasWebgl, Picture } from "./picture/picture.js";
 import { PolicyShelf } from "./policy/shelf.js";
 import { hearingStarter, soundFiles } from "./sound_files.js";
 import { messageOf } from "./support/messages.js";
@@ -47,8 +47,9 @@ function makeShelf({ page, settings, file }: Loaded, timestep: number): PolicySh
 function makePicture(make: () => Picture): [Picture | null, string] {
   try {
     return [make(), ""];
-  } catch {
-    return [null, "This browser shows no 3D pictures (WebGL is missing). The robot walks unseen."];
+  } catch (error) {
+    const why = hasWebgl() ? messageOf(error) : "WebGL is missing";
+    return [null, `There is no picture: ${why}. The robot walks unseen.`];
   }
 }
 

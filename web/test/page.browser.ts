@@ -696,11 +696,33 @@ test("a file of the page that is missing is told of", async () => {
   await opened.page.context().close();
 });
 
+test("a picture that fails for another reason says which, and the robot walks on", async () => {
+  const opened = await site.visit({
+    before: () => {
+      const Observer = globalThis.ResizeObserver;
+      globalThis.ResizeObserver = class extends Observer {
+        override observe(target: Element): void {
+          if (target.id === "view") throw new Error("the canvas cannot be watched");
+          super.observe(target);
+        }
+      };
+    },
+  });
+  assert.equal(
+    await opened.page.textContent("#loading"),
+    "There is no picture: the canvas cannot be watched. The robot walks unseen.",
+  );
+  await leave(opened);
+});
+
 test("a browser without WebGL is told so, and the robot walks on", async () => {
   const blind = await Site.open(["--disable-3d-apis"]);
   try {
     const opened = await blind.visit();
-    assert.match((await opened.page.textContent("#loading")) ?? "", /WebGL is missing/);
+    assert.equal(
+      await opened.page.textContent("#loading"),
+      "There is no picture: WebGL is missing. The robot walks unseen.",
+    );
     await until(opened.page, (mute) => mute!.app.rates.seconds > 1);
     await opened.picture("blind");
     await opened.page.context().close();

@@ -155,6 +155,13 @@ export class Picture {
   }
 }
 
+/** Tells whether the browser has what pictures are made with. */
+export function hasWebgl(): boolean {
+  const context = document.createElement("canvas").getContext("webgl2");
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return context !== null;
+}
+
 /** Where every body is. */
 class Pose {
   private readonly positions: Vector3[];
