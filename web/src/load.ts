@@ -44,7 +44,9 @@ export async function load(): Promise<Loaded> {
 
 /** Returns the file of a controller. */
 export function fileOf(controllers: PageData["controllers"], wanted: string): string {
-  return (controllers.find(({ name }) => name === wanted) ?? controllers[0]).file;
+  const found = controllers.find(({ name }) => name === wanted) ?? controllers[0];
+  if (!found) throw new Error("page.json names no controller");
+  return found.file;
 }
 
 /** Loads a file of the page as bytes. */

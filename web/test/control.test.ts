@@ -111,7 +111,10 @@ test("an empty address is no fault, and every damaged part of another is", () =>
 
 test("no sort of garbage in an address throws or gets past the limits", () => {
   let seed = 1;
-  const random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
+  const random = () => {
+    seed = (seed * 48271) % 2147483647;
+    return seed / 2147483647;
+  };
   for (let i = 0; i < 2000; i++) {
     const letters = Array.from({ length: 30 }, () => String.fromCharCode(32 + 95 * random()));
     const { command } = fromAddress(`#vx=${letters.join("")}&wz=${1e3 * random()}`, page).settings;

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 
 import { LONG, Site } from "./browser.js";
-import { walks } from "./files.js";
+import { walkOf, walks } from "./files.js";
 import { Machine } from "./machine.js";
 
 let site: Site;
@@ -38,7 +38,7 @@ for (const [name, reference] of flat) {
       first_state,
     });
     for (const figure of FIGURES) {
-      const off = Math.abs(measured.gait[figure] / reference.gait[figure] - 1);
+      const off = Math.abs(measured.gait[figure] / (reference.gait[figure] as number) - 1);
       assert.ok(
         off < 0.03,
         `${figure} is ${measured.gait[figure]}, in Python ${reference.gait[figure]}`,
@@ -54,7 +54,7 @@ for (const [name, reference] of flat) {
 
 test("the worklet's own samples have Python's level", async () => {
   const { page, errors } = await site.visit();
-  const { command, surface, terrain, level, first_state, mnl, pnl } = walks.loud;
+  const { command, surface, terrain, level, first_state, mnl, pnl } = walkOf("loud");
   page.setDefaultTimeout(LONG.timeout);
   const measured = await page.evaluate((walk) => globalThis.mute!.measureWorklet(walk), {
     command,

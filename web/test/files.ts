@@ -40,3 +40,10 @@ export const walks = JSON.parse(textOf(reference("walks.json"))).walks as Record
   string,
   ReferenceWalk
 >;
+
+/** Returns one of them. */
+export function walkOf(name: string): ReferenceWalk {
+  const found = walks[name];
+  if (!found) throw new Error(`there is no walk ${name} in walks.json`);
+  return found;
+}

@@ -9,15 +9,19 @@ import { Loop } from "../src/control/loop.js";
 class Browser {
   hidden = false;
   now = 1000;
-  private tick = () => undefined as void;
-  private frame = (_: number) => undefined as void;
-  private seen = () => undefined as void;
+  private tick: () => void = () => undefined;
+  private frame: (now: number) => void = () => undefined;
+  private seen: () => void = () => undefined;
 
   constructor() {
     Object.assign(globalThis, {
       document: this,
-      setInterval: (tick: () => void) => void (this.tick = tick),
-      requestAnimationFrame: (frame: (now: number) => void) => void (this.frame = frame),
+      setInterval: (tick: () => void) => {
+        this.tick = tick;
+      },
+      requestAnimationFrame: (frame: (now: number) => void) => {
+        this.frame = frame;
+      },
     });
     performance.now = () => this.now;
   }

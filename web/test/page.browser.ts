@@ -35,7 +35,7 @@ test("the robot walks at once, as fast as it is asked to", async () => {
   await until(page, (mute) => mute!.app.rates.seconds > 6);
   const { gait, position } = await stateOf(page);
   assert.ok(Math.abs(gait.speed - 0.5) < 0.05, `it walks at ${gait.speed} m/s`);
-  assert.ok(position[0] > 2, `it got ${position[0]} m far`);
+  assert.ok((position[0] as number) > 2, `it got ${position[0]} m far`);
   assert.equal(gait.falls, 0);
   await opened.picture("walks");
   await leave(opened);
@@ -49,10 +49,10 @@ test("every slider, list and button does what it says", async () => {
     ["vx", "0.3"],
     ["vy", "0.2"],
     ["wz", "-0.4"],
-  ]) {
+  ] as const) {
     await page.fill(`#${id}`, value);
     const { command } = await stateOf(page);
-    assert.equal(command[id as "vx"], Number(value));
+    assert.equal(command[id], Number(value));
     assert.match(
       (await page.textContent(`#${id}-value`)) ?? "",
       new RegExp(Number(value).toFixed(2)),
@@ -93,7 +93,7 @@ test("every slider, list and button does what it says", async () => {
 
 test("a push is felt", async () => {
   const opened = await site.visit({ hash: "#vx=0" });
-  const sideways = () => opened.page.evaluate(() => globalThis.mute!.app.state.position[1]);
+  const sideways = () => opened.page.evaluate(() => globalThis.mute!.app.state.position[1]!);
   await until(opened.page, (mute) => mute!.app.rates.seconds > 1);
   const start = await sideways();
   await opened.page.click("#push");
@@ -278,7 +278,7 @@ async function drop(page: Page, name: string, content: Uint8Array): Promise<void
       document.body.dispatchEvent(new DragEvent("dragover", { bubbles: true, dataTransfer }));
       document.body.dispatchEvent(new DragEvent("drop", { bubbles: true, dataTransfer }));
     },
-    [name, base64],
+    [name, base64] as const,
   );
 }
 

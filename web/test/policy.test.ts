@@ -21,7 +21,9 @@ test("the policy acts as ONNX Runtime over 500 control steps of a walk", () => {
   for (let step = 0; step < steps; step++) {
     const action = policy.actOn(kept.subarray(46 * step, 46 * (step + 1)));
     const expected = kept.subarray(46 * steps + 12 * step, 46 * steps + 12 * (step + 1));
-    action.forEach((value, joint) => (worst = Math.max(worst, Math.abs(value - expected[joint]))));
+    action.forEach((value, joint) => {
+      worst = Math.max(worst, Math.abs(value - (expected[joint] as number)));
+    });
   }
   assert.ok(worst < 1e-5, `it is off by ${worst}`);
   assert.ok(worst > 0, "two ways to sum up must differ somewhere");
@@ -54,7 +56,7 @@ test("a file cut short anywhere, or with bytes changed, is refused or still a po
   }
   for (let at = 0; at < 6000; at += 13) {
     const damaged = file.slice();
-    damaged[at] ^= 0xff;
+    (damaged[at] as number) ^= 0xff;
     refusal(damaged); // throws unless it is refused in the right way, or taken
   }
 });

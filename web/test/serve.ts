@@ -16,7 +16,7 @@ const TYPES: Readonly<Record<string, string>> = {
 /** Serves a folder; returns its address and what ends it. */
 export async function serve(folder: string): Promise<{ address: string; close: () => void }> {
   const server: Server = createServer((request, response) => {
-    const path = normalize(decodeURIComponent((request.url ?? "/").split("?")[0]));
+    const path = normalize(decodeURIComponent((request.url ?? "/").split("?")[0] ?? "/"));
     const file = join(folder, path.endsWith("/") ? `${path}index.html` : path);
     try {
       const { size } = statSync(file);

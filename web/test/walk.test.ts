@@ -7,7 +7,7 @@ import { Walk } from "../src/control/walk.js";
 import { loadPhysics } from "../src/physics/mujoco.js";
 import { Simulation } from "../src/physics/simulation.js";
 import { Policy } from "../src/policy/policy.js";
-import { asset, page, type ReferenceWalk, textOf, walks } from "./files.js";
+import { asset, page, type ReferenceWalk, textOf, walkOf, walks } from "./files.js";
 
 const mujoco = await loadPhysics();
 const scenes = { flat: textOf(asset("flat.xml")), stairs: textOf(asset("stairs.xml")) };
@@ -30,7 +30,7 @@ for (const [name, reference] of Object.entries(walks)) {
     const walk = begin(reference);
     walk.restart();
     walk.simulation.qpos.forEach((value, i) => {
-      assert.ok(Math.abs(value - reference.first_state.qpos[i]) < 1e-6, `qpos ${i} is ${value}`);
+      assert.ok(Math.abs(value - (reference.first_state.qpos[i] as number)) < 1e-6, `qpos ${i} is ${value}`);
     });
   });
 
@@ -40,7 +40,8 @@ for (const [name, reference] of Object.entries(walks)) {
     for (let step = 0; step < Math.round(reference.seconds / walk.stepTime); step++) {
       assert.equal(walk.step(), "walking");
       if (step < reference.positions.length) {
-        const off = reference.positions[step].map((x, i) => Math.abs(x - walk.simulation.qpos[i]));
+        const kept = reference.positions[step] as number[];
+        const off = kept.map((x, i) => Math.abs(x - (walk.simulation.qpos[i] as number)));
         worst = Math.max(worst, ...off);
       }
     }
@@ -58,14 +59,14 @@ for (const [name, reference] of Object.entries(walks)) {
       "stride_frequency",
       "power",
     ]) {
-      const off = Math.abs(gait[figure] / reference.gait[figure] - 1);
+      const off = Math.abs((gait[figure] as number) / (reference.gait[figure] as number) - 1);
       assert.ok(off < tolerance, `${figure} is ${gait[figure]}, in Python ${reference.gait[figure]}`);
     }
   });
 }
 
 test("a robot that falls or blows up begins anew, and is in no figure until it walks again", () => {
-  const reference = walks.loud as ReferenceWalk;
+  const reference = walkOf("loud");
   // Upwards at a speed that no robot has, or into a roll that no leg holds up.
   const ends = [
     [2, 1000, "unstable", 0],

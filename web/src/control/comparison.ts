@@ -76,14 +76,18 @@ export class Comparison {
 
   /** Takes note that the robot fell, or blew up, and begins anew. */
   fell(): void {
-    if (this.isRunning) this.falls[this.index]++;
+    if (this.isRunning) (this.falls[this.index] as number)++;
   }
 
   private next(): void {
     this.index++;
-    if (this.index >= BETAS.length) return this.stop(this.verdict());
-    this.page.begin(BETAS[this.index]);
-    this.page.tell(`β ${BETAS[this.index]} walks. ${this.soFar()}`.trim(), true);
+    const beta = BETAS[this.index];
+    if (beta === undefined) {
+      this.stop(this.verdict());
+      return;
+    }
+    this.page.begin(beta);
+    this.page.tell(`β ${beta} walks. ${this.soFar()}`.trim(), true);
     this.count(MEASURED);
   }
 
@@ -98,7 +102,7 @@ export class Comparison {
   }
 
   private verdict(): string {
-    const [loud, quiet] = this.levels;
+    const [loud = NaN, quiet = NaN] = this.levels;
     const difference = loud - quiet;
     const word = difference >= 0 ? "quieter" : "louder";
     const words = `${Math.abs(difference).toFixed(1)} dB ${word} at β 1.`;

@@ -5,6 +5,7 @@
 
 import type { PageData } from "../physics/page_data.js";
 import type { Simulation } from "../physics/simulation.js";
+import { triple } from "../support/vectors.js";
 
 const FEET = 4;
 const NOWHERE = -1e6;
@@ -51,7 +52,7 @@ export class Footfalls {
   reset(simulation: Simulation): void {
     const { contact } = simulation.feet;
     for (let foot = 0; foot < FEET; foot++) {
-      const now = contact[foot] > 0 ? 1 : 0;
+      const now = (contact[foot] as number) > 0 ? 1 : 0;
       this.contact[foot] = now;
       for (const row of this.touch) row[foot] = now;
     }
@@ -70,8 +71,8 @@ export class Footfalls {
     const drop = this.drop.shift() as Float64Array;
     const touch = this.touch.shift() as Uint8Array;
     for (let foot = 0; foot < FEET; foot++) {
-      drop[foot] = Math.max(-velocity[3 * foot + 2], 0);
-      touch[foot] = contact[foot] > 0 ? 1 : 0;
+      drop[foot] = Math.max(-(velocity[3 * foot + 2] as number), 0);
+      touch[foot] = (contact[foot] as number) > 0 ? 1 : 0;
     }
     this.drop.push(drop);
     this.touch.push(touch);
@@ -84,7 +85,7 @@ export class Footfalls {
 
   private close(simulation: Simulation, foot: number): void {
     let steps = 0;
-    for (let i = this.depth - this.decimation; i < this.depth; i++) steps += this.touch[i][foot];
+    for (const touch of this.touch.slice(this.depth - this.decimation)) steps += touch[foot] as number;
     this.contactShare[foot] = steps / this.decimation;
     const inStance = this.contact[foot] === 1;
     this.debounce(foot, steps > 0);
@@ -95,16 +96,16 @@ export class Footfalls {
 
   private debounce(foot: number, raw: boolean): void {
     const disagrees = raw !== (this.contact[foot] === 1);
-    this.contradicted[foot] = disagrees ? this.contradicted[foot] + 1 : 0;
+    this.contradicted[foot] = disagrees ? (this.contradicted[foot] as number) + 1 : 0;
     const changed = this.contradicted[foot] >= this.minSteps;
     this.touchdown[foot] = changed && this.contact[foot] === 0 ? 1 : 0;
     if (!changed) return;
-    this.contact[foot] ^= 1;
+    (this.contact[foot] as number) ^= 1;
     this.contradicted[foot] = 0;
   }
 
   private raise(simulation: Simulation, foot: number, lifting: boolean, inStance: boolean): void {
-    const [x, , z] = simulation.feet.position.subarray(3 * foot, 3 * foot + 3);
+    const [x, , z] = triple(simulation.feet.position, foot);
     const height = z - this.page.foot_radius;
     const { near } = this.page.footfall;
     const ground = Math.max(...[0, near, -near].map((dx) => simulation.groundHeight(x + dx)));
@@ -112,11 +113,11 @@ export class Footfalls {
       this.highest[foot] = height;
       this.highestGround[foot] = ground;
     } else if (!inStance) {
-      this.highest[foot] = Math.max(this.highest[foot], height);
-      this.highestGround[foot] = Math.max(this.highestGround[foot], ground);
+      this.highest[foot] = Math.max(this.highest[foot] as number, height);
+      this.highestGround[foot] = Math.max(this.highestGround[foot] as number, ground);
     }
     if (lifting || !inStance) {
-      this.swingApex[foot] = this.highest[foot] - this.highestGround[foot];
+      this.swingApex[foot] = (this.highest[foot] as number) - (this.highestGround[foot] as number);
     }
   }
 
@@ -124,10 +125,10 @@ export class Footfalls {
   private speedOfLanding(foot: number): number {
     const begin = this.depth - this.minSteps * this.decimation;
     let first = begin;
-    while (first < this.depth && !this.touch[first][foot]) first++;
+    while (first < this.depth && !this.touch[first]?.[foot]) first++;
     let speed = 0;
     for (let i = Math.max(first - this.window + 1, 0); i <= first && i < this.depth; i++) {
-      speed = Math.max(speed, this.drop[i][foot]);
+      speed = Math.max(speed, this.drop[i]?.[foot] ?? 0);
     }
     return speed;
   }

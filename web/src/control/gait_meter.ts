@@ -4,6 +4,7 @@ import type { Command } from "../physics/page_data.js";
 import type { Simulation } from "../physics/simulation.js";
 import type { Footfalls } from "./footfalls.js";
 import type { Observer } from "./observer.js";
+import { triple } from "../support/vectors.js";
 
 /** Figures over some time; NaN where nothing happened to measure. */
 export interface Gait {
@@ -53,18 +54,18 @@ export class GaitMeter {
   update(command: Command, seen: Observer, feet: Footfalls, simulation: Simulation): void {
     if (++this.age <= this.settleSteps) return;
     this.steps++;
-    const [vx, vy] = seen.base_lin_vel;
+    const [vx, vy] = triple(seen.base_lin_vel);
     this.add("speed", vx);
     this.add("velocity", (command.vx - vx) ** 2 + (command.vy - vy) ** 2);
-    this.add("yaw", (command.wz - seen.base_ang_vel[2]) ** 2);
+    this.add("yaw", (command.wz - (seen.base_ang_vel[2] as number)) ** 2);
     this.add("power", power(simulation));
     for (let foot = 0; foot < FEET; foot++) {
-      this.add("contact", feet.contactShare[foot] / FEET);
+      this.add("contact", (feet.contactShare[foot] as number) / FEET);
       if (!feet.touchdown[foot]) continue;
       this.add("landings", 1);
-      this.add("landing", feet.landingSpeed[foot]);
-      this.add("landing squared", feet.landingSpeed[foot] ** 2);
-      this.add("apex", feet.swingApex[foot]);
+      this.add("landing", feet.landingSpeed[foot] as number);
+      this.add("landing squared", (feet.landingSpeed[foot] as number) ** 2);
+      this.add("apex", feet.swingApex[foot] as number);
     }
   }
 
@@ -107,6 +108,8 @@ export class GaitMeter {
 function power(simulation: Simulation): number {
   const { torque, qvel } = simulation;
   let sum = 0;
-  for (let joint = 0; joint < 12; joint++) sum += Math.abs(torque[joint] * qvel[6 + joint]);
+  for (let joint = 0; joint < 12; joint++) {
+    sum += Math.abs((torque[joint] as number) * (qvel[6 + joint] as number));
+  }
   return sum;
 }

@@ -3,6 +3,7 @@
 import type { Observation } from "../policy/policy.js";
 import type { Command } from "../physics/page_data.js";
 import type { Simulation } from "../physics/simulation.js";
+import { quadruple } from "../support/vectors.js";
 
 /** The trunk in the frames that observations and figures ask for; all numbers are single. */
 export class Observer implements Observation {
@@ -23,15 +24,17 @@ export class Observer implements Observation {
     const rotation = rotationOf(this.qpos.subarray(3, 7));
     for (let axis = 0; axis < 3; axis++) {
       let speed = 0;
-      for (let row = 0; row < 3; row++) speed += rotation[3 * row + axis] * Math.fround(qvel[row]);
+      for (let row = 0; row < 3; row++) {
+        speed += (rotation[3 * row + axis] as number) * Math.fround(qvel[row] as number);
+      }
       this.base_lin_vel[axis] = speed;
       // MuJoCo gives a free joint's angular velocity in the body frame already.
-      this.base_ang_vel[axis] = qvel[3 + axis];
-      this.projected_gravity[axis] = -rotation[6 + axis];
+      this.base_ang_vel[axis] = qvel[3 + axis] as number;
+      this.projected_gravity[axis] = -(rotation[6 + axis] as number);
     }
     for (let joint = 0; joint < 12; joint++) {
-      this.joint_pos[joint] = this.qpos[7 + joint] - defaultJointPos[joint];
-      this.joint_vel[joint] = qvel[6 + joint];
+      this.joint_pos[joint] = (this.qpos[7 + joint] as number) - (defaultJointPos[joint] as number);
+      this.joint_vel[joint] = qvel[6 + joint] as number;
     }
   }
 
@@ -44,7 +47,7 @@ export class Observer implements Observation {
 
 /** Returns the rotation from body to world of a unit quaternion w x y z, row by row. */
 function rotationOf(quaternion: ArrayLike<number>): readonly number[] {
-  const [w, x, y, z] = Array.from(quaternion);
+  const [w, x, y, z] = quadruple(quaternion);
   return [
     1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
     2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),

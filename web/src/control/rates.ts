@@ -8,7 +8,7 @@ export class Rate {
   /** Takes note that it happened, some times, at a time in s. */
   add(now: number, count: number): void {
     this.counts.push([now, count]);
-    while (this.counts.length > 1 && now - this.counts[0][0] > SPAN) this.counts.shift();
+    while (this.counts.length > 1 && now - (this.counts[0]?.[0] ?? now) > SPAN) this.counts.shift();
   }
 
   /** Forgets what was. */
@@ -18,9 +18,9 @@ export class Rate {
 
   /** Times a second; 0 while nothing is known. */
   get perSecond(): number {
-    if (this.counts.length < 2) return 0;
     const [first] = this.counts;
-    const last = this.counts[this.counts.length - 1];
+    const last = this.counts.at(-1);
+    if (!first || !last) return 0;
     const happened = this.counts.slice(1).reduce((sum, [, count]) => sum + count, 0);
     return last[0] > first[0] ? happened / (last[0] - first[0]) : 0;
   }

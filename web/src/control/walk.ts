@@ -77,7 +77,8 @@ export class Walk {
     const { ctrl } = simulation;
     for (let joint = 0; joint < 12; joint++) {
       ctrl[joint] = Math.fround(
-        policy.defaultJointPos[joint] + policy.actionScale[joint] * action[joint],
+        (policy.defaultJointPos[joint] as number) +
+          (policy.actionScale[joint] as number) * (action[joint] as number),
       );
     }
     simulation.step(policy.decimation, (now) => {

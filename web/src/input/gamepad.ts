@@ -42,7 +42,8 @@ export class GamepadInput {
   }
 
   private readSticks(pad: Gamepad): void {
-    const [x, y, turn] = [0, 1, 2].map((axis) => -withoutSlack(pad.axes[axis] ?? 0) || 0);
+    const pull = (axis: number) => -withoutSlack(pad.axes[axis] ?? 0) || 0;
+    const [x, y, turn] = [pull(0), pull(1), pull(2)];
     const pulled = x !== 0 || y !== 0 || turn !== 0;
     // A stick that rests leaves the command to keys and sliders.
     if (pulled) this.actions.drive(y, x, turn);

@@ -8,6 +8,7 @@ import { compile, type MainModule } from "./mujoco.js";
 import type { Floor, PageData } from "./page_data.js";
 import { Stairs } from "./stairs.js";
 import { FEET, type FootReadings, World } from "./world.js";
+import { quadruple, triple } from "../support/vectors.js";
 
 export type Ground = "flat" | "stairs";
 
@@ -130,10 +131,10 @@ export class Simulation {
     const { position } = world.feet();
     let lowest = Infinity;
     for (let foot = 0; foot < FEET; foot++) {
-      const [x, , z] = position.subarray(3 * foot, 3 * foot + 3);
+      const [x, , z] = triple(position, foot);
       lowest = Math.min(lowest, z - this.page.foot_radius - this.groundHeight(x));
     }
-    this.qpos[2] -= lowest;
+    (this.qpos[2] as number) -= lowest;
     mujoco.mj_forward(world.model, world.data);
   }
 
@@ -147,8 +148,8 @@ export class Simulation {
 
   /** Pushes the trunk: adds to its velocity in the world frame, m/s. */
   push(x: number, y: number): void {
-    this.qvel[0] += x;
-    this.qvel[1] += y;
+    (this.qvel[0] as number) += x;
+    (this.qvel[1] as number) += y;
   }
 
   /** Advances by some physics steps, in which `ctrl` holds. */
@@ -175,7 +176,7 @@ export class Simulation {
 
   /** Cosine of the trunk's tilt. */
   get upright(): number {
-    const [, x, y] = this.qpos.subarray(3, 7);
+    const [, x, y] = quadruple(this.qpos.subarray(3, 7));
     return 1 - 2 * (x * x + y * y);
   }
 
@@ -187,7 +188,7 @@ export class Simulation {
 
   private lay(): void {
     if (this.ground !== "stairs") return;
-    const [x, y] = this.qpos;
+    const [x, y] = triple(this.qpos);
     const cell = this.stairs.cell(x, y);
     if (cell === this.cell) return;
     this.cell = cell;

@@ -20,7 +20,7 @@ export class Stairs {
   }
 
   private get riser(): number {
-    return this.figures.risers[this.level];
+    return this.figures.risers[this.level] ?? 0;
   }
 
   /** Returns the height of the ground at a place, m. */

@@ -68,7 +68,7 @@ export class World {
 
   view(name: "qpos" | "qvel" | "ctrl" | "actuator_force" | "xpos" | "xquat" | "sensordata") {
     const kept = this.views.get(name);
-    if (kept && kept.buffer.byteLength) return kept;
+    if (kept?.buffer.byteLength) return kept;
     // Its memory grew, and the old one is detached.
     this.readings = null;
     const view = this.data[name] as Float64Array;
@@ -95,7 +95,7 @@ export class World {
   /** Trunk and head. */
   trunkTouches(): boolean {
     const data = this.view("sensordata");
-    return data[this.trunkContact] > 0 || data[this.trunkContact + 1] > 0;
+    return (data[this.trunkContact] as number) > 0 || (data[this.trunkContact + 1] as number) > 0;
   }
 
   setFloor(floor: Floor): void {
@@ -112,8 +112,8 @@ export class World {
     const width = model.actuator_gainprm.length / model.nu;
     this.servos.forEach((servo, joint) => {
       model.actuator_gainprm[width * servo] = stiffness[joint];
-      model.actuator_biasprm[width * servo + 1] = -stiffness[joint];
-      model.actuator_biasprm[width * servo + 2] = -damping[joint];
+      model.actuator_biasprm[width * servo + 1] = -(stiffness[joint] as number);
+      model.actuator_biasprm[width * servo + 2] = -(damping[joint] as number);
     });
   }
 
@@ -141,12 +141,12 @@ export class World {
     mujoco.mj_comPos(model, scratch);
     mujoco.mj_crb(model, scratch);
     mujoco.mj_factorM(model, scratch);
-    mujoco.mj_jacSite(model, scratch, jacobian, null, this.sites[foot]);
+    mujoco.mj_jacSite(model, scratch, jacobian, null, this.sites[foot] as number);
     const down = Array.from(
       jacobian.GetView().subarray(2 * model.nv, 3 * model.nv) as Float64Array,
     );
     mujoco.mj_solveM(model, scratch, solved, down);
     const response = solved.GetView() as Float64Array;
-    return 1 / down.reduce((sum, value, i) => sum + value * response[i], 0);
+    return 1 / down.reduce((sum, value, i) => sum + value * (response[i] as number), 0);
   }
 }

@@ -108,7 +108,7 @@ function tiles(): HTMLCanvasElement {
     [1, 0, 236],
     [0, 1, 236],
     [1, 1, 255],
-  ]) {
+  ] as const) {
     context.fillStyle = `rgb(${shade} ${shade} ${shade})`;
     context.fillRect(128 * column, 128 * row, 128, 128);
     context.strokeStyle = "rgb(190 190 190)";

@@ -10,6 +10,7 @@ import {
   DirectionalLight,
   Fog,
   HemisphereLight,
+  type Object3D,
   PCFShadowMap,
   Quaternion,
   Scene,
@@ -23,6 +24,7 @@ import { GroundPicture, ShadowSpot } from "./ground.js";
 import { Orbit } from "./orbit.js";
 import { drawsInSoftware, PixelBudget } from "./pixel_budget.js";
 import { buildRobot } from "./robot.js";
+import { quadruple } from "../support/vectors.js";
 
 const TRUNK = 1;
 
@@ -111,7 +113,7 @@ export class Picture {
       body.position.lerpVectors(before.position(index), after.position(index), between);
       body.quaternion.slerpQuaternions(before.turn(index), after.turn(index), between);
     });
-    const trunk = this.robot.children[TRUNK].position;
+    const trunk = this.trunk.position;
     this.ground.follow(trunk.x, trunk.y, simulation.flights);
     this.target.lerp(trunk, Math.min(1, 6 * seconds));
     this.spot.position.set(trunk.x, trunk.y, simulation.groundHeight(trunk.x) + 0.004);
@@ -119,6 +121,10 @@ export class Picture {
     this.sun.target.position.copy(trunk);
     this.orbit.lookAt(this.target);
     this.renderer.render(this.scene, this.orbit.camera);
+  }
+
+  private get trunk(): Object3D {
+    return this.robot.children[TRUNK] as Object3D;
   }
 
   /** Triangles and calls of the last picture, for measurements. */
@@ -173,18 +179,20 @@ class Pose {
   }
 
   position(body: number): Vector3 {
-    return this.positions[body];
+    return this.positions[body] as Vector3;
   }
 
   turn(body: number): Quaternion {
-    return this.turns[body];
+    return this.turns[body] as Quaternion;
   }
 
   read(simulation: Simulation): void {
     const { bodyPosition: at, bodyQuaternion: turned } = simulation;
-    this.positions.forEach((position, body) => position.fromArray(at, 3 * body));
+    this.positions.forEach((position, body) => {
+      position.fromArray(at, 3 * body);
+    });
     this.turns.forEach((turn, body) => {
-      const [w, x, y, z] = turned.subarray(4 * body, 4 * body + 4);
+      const [w, x, y, z] = quadruple(turned, body);
       turn.set(x, y, z, w);
     });
   }

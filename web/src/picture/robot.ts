@@ -2,7 +2,7 @@
 
 import {
   BoxGeometry,
-  BufferGeometry,
+  type BufferGeometry,
   CapsuleGeometry,
   Color,
   CylinderGeometry,
@@ -17,6 +17,7 @@ import {
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 
 import type { MainModule, MjModel } from "../physics/mujoco.js";
+import { quadruple, triple } from "../support/vectors.js";
 
 /** Group of the shapes that are there to be looked at. */
 const VISUAL = 2;
@@ -53,7 +54,7 @@ function buildBody(mujoco: MainModule, model: MjModel, body: number, detail: num
 }
 
 function shapeOf(mujoco: MainModule, model: MjModel, geom: number, detail: number): BufferGeometry {
-  const [a, b, c] = model.geom_size.subarray(3 * geom, 3 * geom + 3) as Float64Array;
+  const [a, b, c] = triple(model.geom_size as Float64Array, geom);
   const kind = mujoco.mjtGeom;
   let shape: BufferGeometry;
   switch (model.geom_type[geom]) {
@@ -72,8 +73,8 @@ function shapeOf(mujoco: MainModule, model: MjModel, geom: number, detail: numbe
     default:
       throw new Error(`shape ${geom} of the robot is of a kind that is not drawn`);
   }
-  const [x, y, z] = model.geom_pos.subarray(3 * geom, 3 * geom + 3) as Float64Array;
-  const [qw, qx, qy, qz] = model.geom_quat.subarray(4 * geom, 4 * geom + 4) as Float64Array;
+  const [x, y, z] = triple(model.geom_pos as Float64Array, geom);
+  const [qw, qx, qy, qz] = quadruple(model.geom_quat as Float64Array, geom);
   const place = new Matrix4().compose(
     new Vector3(x, y, z),
     new Quaternion(qx, qy, qz, qw),
@@ -83,7 +84,7 @@ function shapeOf(mujoco: MainModule, model: MjModel, geom: number, detail: numbe
 }
 
 function materialOf(model: MjModel, material: number): MeshPhongMaterial {
-  const [r, g, b] = model.mat_rgba.subarray(4 * material, 4 * material + 3) as Float32Array;
+  const [r, g, b] = quadruple(model.mat_rgba as Float32Array, material);
   const shine = model.mat_shininess[material] as number;
   return new MeshPhongMaterial({
     color: new Color().setRGB(r, g, b, "srgb"),

@@ -77,7 +77,9 @@ function build(node: OnnxNode, values: Map<string, Tensor>): [step: Step, work: 
   if (node.outputs.length > outputs.length) {
     throw new RangeError(`a ${node.operator} has too many outputs`);
   }
-  node.outputs.forEach((name, index) => values.set(name, outputs[index]));
+  node.outputs.forEach((name, index) => {
+    values.set(name, outputs[index] as Tensor);
+  });
   return [step, workOf(node, inputs, outputs)];
 }
 
@@ -100,16 +102,27 @@ function number(node: OnnxNode, name: string, otherwise: number): number {
   return typeof value === "number" && !Number.isNaN(value) ? value : otherwise;
 }
 
-function require(right: boolean, node: OnnxNode): void {
+function require(right: boolean, node: OnnxNode): asserts right {
   if (!right) throw new RangeError(`a ${node.operator} is of a form that is not known here`);
+}
+
+/** Returns an input of a node, which must have it. */
+function input(node: OnnxNode, inputs: readonly Tensor[], index: number): Tensor {
+  const found = inputs[index];
+  if (!found) throw new RangeError(`a ${node.operator} has too few inputs`);
+  return found;
 }
 
 /** Of each number on its own. */
 function unary(make: (node: OnnxNode) => (x: number) => number): Builder {
-  return (node, [x]) => {
+  return (node, inputs) => {
+    const x = input(node, inputs, 0);
     const f = make(node);
     const y = empty(x.shape);
-    return [[y], () => y.data.forEach((_, i) => (y.data[i] = f(x.data[i])))];
+    const step = () => {
+      for (let i = 0; i < x.data.length; i++) y.data[i] = f(x.data[i] as number);
+    };
+    return [[y], step];
   };
 }
 
@@ -117,7 +130,7 @@ function unary(make: (node: OnnxNode) => (x: number) => number): Builder {
 function binary(f: (a: number, b: number) => number): Builder {
   return (node, inputs) => {
     require(inputs.length === 2, node);
-    const [a, b] = inputs;
+    const [a, b] = [input(node, inputs, 0), input(node, inputs, 1)];
     const [p, q] = [a.data.length, b.data.length];
     require(p === q || p === 1 || q === 1, node);
     const y = empty(p >= q ? a.shape : b.shape);
@@ -126,17 +139,21 @@ function binary(f: (a: number, b: number) => number): Builder {
     return [
       [y],
       () => {
-        for (let k = 0; k < data.length; k++) data[k] = f(a.data[i * k], b.data[j * k]);
+        for (let k = 0; k < data.length; k++) {
+          data[k] = f(a.data[i * k] as number, b.data[j * k] as number);
+        }
       },
     ];
   };
 }
 
+type Three = [Tensor, Tensor, Tensor];
+
 /** y = alpha x W^T + beta c, for one row x. */
 const gemm: Builder = (node, inputs) => {
   require(inputs.length === 3 && number(node, "transB", 0) === 1, node);
-  const [x, weight, bias] = inputs;
-  const [rows, columns] = weight.shape;
+  const [x, weight, bias] = [0, 1, 2].map((index) => input(node, inputs, index)) as Three;
+  const [rows = 0, columns = 0] = weight.shape;
   const fits = weight.shape.length === 2 && x.data.length === columns && bias.data.length === rows;
   require(fits && number(node, "transA", 0) === 0, node);
   require(number(node, "alpha", 1) === 1 && number(node, "beta", 1) === 1, node);
@@ -147,8 +164,10 @@ const gemm: Builder = (node, inputs) => {
 function product(weight: Float32Array, x: Float32Array, bias: Float32Array, y: Float32Array): void {
   const columns = x.length;
   for (let row = 0, at = 0; row < y.length; row++) {
-    let sum = bias[row];
-    for (let column = 0; column < columns; column++) sum += weight[at++] * x[column];
+    let sum = bias[row] as number;
+    for (let column = 0; column < columns; column++) {
+      sum += (weight[at++] as number) * (x[column] as number);
+    }
     y[row] = sum;
   }
 }
@@ -157,12 +176,13 @@ function product(weight: Float32Array, x: Float32Array, bias: Float32Array, y: F
 function lastAxis(node: OnnxNode, tensor: Tensor, axis: number): number {
   const { shape } = tensor;
   require(axis === -1 || axis === shape.length - 1, node);
-  const width = shape.length ? shape[shape.length - 1] : 1;
+  const width = shape.at(-1) ?? 1;
   require(width === tensor.data.length, node);
   return width;
 }
 
-const split: Builder = (node, [x]) => {
+const split: Builder = (node, inputs) => {
+  const x = input(node, inputs, 0);
   const width = lastAxis(node, x, number(node, "axis", 0));
   const parts = number(node, "num_outputs", node.outputs.length);
   require(parts >= 1 && parts <= width && width % parts === 0 && node.inputs.length === 1, node);
@@ -188,22 +208,29 @@ const concat: Builder = (node, inputs) => {
   return [[y], step];
 };
 
+/** Returns a number that an input holds; undefined where there is no such input. */
+function whole(node: OnnxNode, inputs: readonly Tensor[], index: number): number | undefined {
+  require((inputs[index]?.data.length ?? 1) === 1, node);
+  return inputs[index]?.data[0];
+}
+
 const slice: Builder = (node, inputs) => {
-  const [x, starts, ends, axes, steps] = inputs;
-  const single = [starts, ends, axes, steps ?? axes].every((t) => t?.data.length === 1);
-  require(single && (steps ? steps.data[0] === 1 : true), node);
-  const width = lastAxis(node, x, axes.data[0]);
+  const x = input(node, inputs, 0);
+  const [start, end, axis, by] = [1, 2, 3, 4].map((index) => whole(node, inputs, index));
+  require(by === undefined || by === 1, node);
+  require(start !== undefined && end !== undefined && axis !== undefined, node);
+  const width = lastAxis(node, x, axis);
   const place = (index: number) => Math.min(Math.max(index < 0 ? width + index : index, 0), width);
-  const [from, to] = [place(starts.data[0]), place(ends.data[0])];
+  const [from, to] = [place(start), place(end)];
   require(from < to, node);
   const y = { shape: [1, to - from], data: x.data.subarray(from, to) };
   return [[y], () => undefined];
 };
 
 const reduceSum: Builder = (node, inputs) => {
-  const [x, axes] = inputs;
-  require(axes?.data.length === 1 && number(node, "keepdims", 1) === 1, node);
-  lastAxis(node, x, axes.data[0]);
+  const [x, axis] = [input(node, inputs, 0), whole(node, inputs, 1)];
+  require(axis !== undefined && number(node, "keepdims", 1) === 1, node);
+  lastAxis(node, x, axis);
   const y = empty([1, 1]);
   const step = () => {
     let sum = 0;
@@ -213,7 +240,7 @@ const reduceSum: Builder = (node, inputs) => {
   return [[y], step];
 };
 
-const same: Builder = (_, [x]) => [[x], () => undefined];
+const same: Builder = (node, inputs) => [[input(node, inputs, 0)], () => undefined];
 
 const sigmoid = (x: number) => 1 / (1 + Math.exp(-x));
 

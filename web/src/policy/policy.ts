@@ -91,7 +91,7 @@ export class Policy {
       this.damping = Float64Array.from(metadata.numbers("joint_damping", 12));
       this.defaultJointPos = Float32Array.from(metadata.numbers("default_joint_pos", 12));
       this.actionScale = Float32Array.from(metadata.numbers("action_scale", 12));
-      [this.actionClip] = metadata.numbers("action_clip", 1);
+      this.actionClip = metadata.number("action_clip");
       this.decimation = metadata.steps("control_dt", robot.timestep);
       this.order = metadata.observationNames();
       this.scales = metadata.scales(this.order);
@@ -120,7 +120,7 @@ export class Policy {
   act(observation: Observation): Float32Array {
     let at = 0;
     this.order.forEach((name, part) => {
-      const scale = this.scales[part];
+      const scale = this.scales[part] as number;
       for (const value of observation[name]) this.input[at++] = value * scale;
     });
     return this.actOn(this.input);
@@ -169,6 +169,10 @@ class Metadata {
     if (this.text(name) !== expected) throw new RangeError(`it has other ${name}`);
   }
 
+  number(name: string): number {
+    return this.numbers(name, 1)[0] as number;
+  }
+
   numbers(name: string, count: number): number[] {
     const values = this.text(name).split(",").map(Number);
     if (values.length !== count || !values.every(Number.isFinite)) {
@@ -179,7 +183,7 @@ class Metadata {
 
   /** Returns how many physics steps a time takes. */
   steps(name: string, timestep: number): number {
-    const [time] = this.numbers(name, 1);
+    const time = this.number(name);
     const steps = Math.round(time / timestep);
     if (!(steps >= 1 && steps <= 1000 && Math.abs(steps * timestep - time) < 1e-9)) {
       throw new RangeError(`its ${name} is no multiple of the physics step`);

@@ -62,7 +62,7 @@ class Reader {
     let value = 0n;
     for (let shift = 0n; shift < 70n; shift += 7n) {
       if (this.at >= this.bytes.length) throw new RangeError("it ends within a number");
-      const byte = this.bytes[this.at++];
+      const byte = this.bytes[this.at++] as number;
       value |= BigInt(byte & 0x7f) << shift;
       if (byte < 0x80) return Number(BigInt.asIntN(64, value));
     }

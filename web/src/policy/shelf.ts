@@ -52,7 +52,7 @@ export class PolicyShelf {
 
   /** Returns the name of a policy that others have, too: this one, or the page's first. */
   shared(name: string): string {
-    return (this.entries.find((one) => one.name === name) ?? this.entries[0]).name;
+    return (this.entries.find((one) => one.name === name) ?? this.entries[0])?.name ?? "";
   }
 
   private put(name: string, file: Uint8Array): Policy {

@@ -22,7 +22,7 @@ export function initialSettings(page: PageData): Settings {
     floor: page.surface,
     ground: "flat",
     level: 0,
-    controller: page.controllers[0].name,
+    controller: page.controllers[0]?.name ?? "",
   };
 }
 

@@ -32,7 +32,7 @@ export class Blow {
   strike(floor: FloorTable, law: LawTable, mass: number, speed: number): void {
     const { exponent, stiffness, mobility } = floor;
     const energy = ((exponent + 1) * mass * speed * speed) / (2 * stiffness);
-    const depth = Math.pow(energy, 1 / (exponent + 1));
+    const depth = energy ** (1 / (exponent + 1));
     this.look(law, (mobility * mass * speed) / depth);
     this.duration = (this.between(law.duration) * depth) / speed;
     this.impulse = this.between(law.impulse) * mass * speed;

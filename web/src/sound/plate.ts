@@ -73,9 +73,16 @@ export class PlateSound {
    */
   sound(presses: readonly Press[], count: number, out: Float64Array): void {
     const { heard } = this;
-    if (count > 0) this.left = this.lasting;
-    else if (this.left <= 0) return;
-    else if ((this.left -= heard.length) <= 0) return this.reset();
+    if (count > 0) {
+      this.left = this.lasting;
+    } else {
+      if (this.left <= 0) return;
+      this.left -= heard.length;
+      if (this.left <= 0) {
+        this.reset();
+        return;
+      }
+    }
     this.radiate(presses, count);
     for (let tier = 0; tier < this.tiers.length; tier++) {
       (this.tiers[tier] as Tier).ring(presses, count, heard);

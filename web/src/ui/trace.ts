@@ -17,7 +17,8 @@ export class Trace {
   add(level: number, seconds: number): void {
     this.now += seconds;
     if (Number.isFinite(level)) this.readings.push([this.now, level]);
-    while (this.readings.length && this.now - this.readings[0][0] > SPAN) this.readings.shift();
+    const isOver = () => this.now - (this.readings[0]?.[0] ?? this.now) > SPAN;
+    while (isOver()) this.readings.shift();
     this.draw();
   }
 

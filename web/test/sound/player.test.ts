@@ -70,7 +70,7 @@ test("what the player is fed is played in shares of the full scale, and its leve
       for (let block = 0; block < 7; block++) {
         assert.ok(processor.process([], [[...stereo]]));
         playback.play(wanted);
-        wanted.forEach((own, i) => assert.equal(stereo[1][i], Math.fround(own / tables.full_scale)));
+        assert.deepEqual(stereo[1], wanted.map((own) => own / tables.full_scale));
         assert.deepEqual(stereo[0], stereo[1]);
       }
     }

@@ -222,7 +222,7 @@ test("the audio thread makes no arrays as it plays", () => {
   const out = new Float32Array(128);
   const arrays = [Float32Array, Float64Array, Int32Array] as const;
   const made: string[] = [];
-  const forbidden = (name: string, own: Function) =>
+  const forbidden = (name: string, own: new (...given: never[]) => object) =>
     new Proxy(own, {
       construct(target, given) {
         made.push(name);
@@ -259,7 +259,10 @@ test("what a robot does after a fall is in no figure until it walks again, and w
   const play = (seconds: number, loud = false) => {
     for (let step = 0; step < 1000 * seconds; step++) {
       const batch = steps(step % walked, 1);
-      if (loud) viewReadings(batch).jointTorque.forEach((own, i, all) => (all[i] = 10 * own));
+      if (loud) {
+        const { jointTorque } = viewReadings(batch);
+        jointTorque.set(jointTorque.map((own) => 10 * own));
+      }
       playback.feed(batch);
       playback.play(out);
     }
