@@ -8,7 +8,9 @@ import { walkOf, walks } from "./files.js";
 import { Machine } from "./machine.js";
 
 let site: Site;
-before(async () => (site = await Site.open()));
+before(async () => {
+  site = await Site.open();
+});
 after(async () => site.close());
 
 const FIGURES = [
