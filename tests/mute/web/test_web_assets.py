@@ -12,10 +12,12 @@ import mujoco
 import numpy as np
 import onnxruntime
 import pytest
+from dreamwaq_helpers import write_dreamwaq_policy
 from places import REPOSITORY, RESOURCES
 
 from mute.acoustics.floors import FLOORS
 from mute.checkpoint import load_checkpoint, save_checkpoint
+from mute.command_lines.policy_options import policies_that_ship
 from mute.command_lines.web import main
 from mute.controllers import load_policy
 from mute.envs.quadruped_env import QuadrupedEnv, scene_of
@@ -115,3 +117,25 @@ def test_further_policies_come_into_the_list_of_controllers_unless_their_task_is
         ("go1_other", "go1_other.onnx"),
     ]
     assert (tmp_path / "go1_other.onnx").is_file()
+
+
+def test_every_policy_that_ships_comes_into_the_list_unless_its_task_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    one = write_dreamwaq_policy(tmp_path / "go1_dreamwaq.pt")
+    monkeypatch.setattr("mute.command_lines.web.policies_that_ship", lambda: [one, SHIPPED])
+    for words, names in (
+        ([], ["go1_mute", "go1_dreamwaq"]),
+        (["--policy", str(one)], ["go1_dreamwaq", "go1_mute"]),
+    ):
+        out = tmp_path / "assets"
+        assert main(["--out", str(out), *words]) == 0
+        controllers = json.loads((out / "page.json").read_text())["controllers"]
+        assert [controller["name"] for controller in controllers] == names
+        named = {"name": "go1_dreamwaq", "label": "DreamWaQ", "file": "go1_dreamwaq.onnx"}
+        assert named in controllers
+
+
+def test_policies_that_ship_are_all_of_the_resources():
+    assert SHIPPED in policies_that_ship()
+    assert policies_that_ship() == sorted((RESOURCES / "go1").glob("*.pt"))
