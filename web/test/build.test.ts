@@ -34,10 +34,16 @@ function checkout(name: string): string {
   return web;
 }
 
-function bundle(web: string): { status: number | null; told: string } {
+function bundle(web: string): { status: number | null; told: string; printed: string } {
   const words = [join(web, "build", "bundle.mjs")];
-  const { status, stderr } = spawnSync(process.execPath, words, { encoding: "utf8", timeout: 60_000 });
-  return { status, told: stderr };
+  const run = spawnSync(process.execPath, words, { encoding: "utf8", timeout: 60_000 });
+  return { status: run.status, told: run.stderr, printed: run.stdout };
+}
+
+function builds(web: string): string {
+  const { status, told, printed } = bundle(web);
+  assert.deepEqual({ status, told }, { status: 0, told: "" });
+  return printed;
 }
 
 /** Returns the names of the page's packages, as `package.json` pins them. */
@@ -50,7 +56,7 @@ test("a checkout in a folder with blanks and accents is built, without what earl
   writeFileSync(join(web, "assets", "go1_old.onnx"), "of another build");
   mkdirSync(join(web, "dist"));
   writeFileSync(join(web, "dist", "go1_older.onnx"), "of one before");
-  assert.deepEqual(bundle(web), { status: 0, told: "" });
+  builds(web);
   const built = readdirSync(join(web, "dist"));
   assert.ok(built.includes("main.js") && built.includes("go1_mute.onnx"));
   assert.deepEqual(built.filter((name) => /old/.test(name)), []);
@@ -60,9 +66,18 @@ test("a checkout in a folder with blanks and accents is built, without what earl
   assert.deepEqual(links.filter((link) => !built.includes(link)), []);
 });
 
+test("what the page weighs is told in its documentation", () => {
+  const printed = builds(checkout("weighed"));
+  const [, all, packed] = printed.match(/^in all +(\d+) kB, compressed +(\d+) kB$/m) ?? [];
+  const [, told, toldPacked] =
+    readFileSync("../docs/web.md", "utf8").match(/it is ([\d.]+) MB in all, ([\d.]+) MB compressed/) ?? [];
+  assert.ok(Math.abs(Number(told) - Number(all) / 1000) < 0.1, `it is ${all} kB, not ${told} MB`);
+  assert.ok(Math.abs(Number(toldPacked) - Number(packed) / 1000) < 0.1, `compressed ${packed} kB`);
+});
+
 test("licenses.txt has the licence of every package, and of what is compiled into MuJoCo", () => {
   const web = checkout("licences");
-  assert.deepEqual(bundle(web), { status: 0, told: "" });
+  builds(web);
   const text = readFileSync(join(web, "dist", "licenses.txt"), "utf8");
   const heads = [...text.matchAll(/^=+\n(.+): (.+)\n=+$/gm)].map(([, name, license]) => [name, license]);
   const licenses: Record<string, string> = { "@mujoco/mujoco": "Apache-2.0", three: "MIT" };
