@@ -16,12 +16,15 @@ from mute.web.sound_references import write_sound_references
 
 __all__ = ["WebArgs", "main"]
 
+_ASSETS = Path("web/assets")
+_PAGE = Path("web/package.json")
+
 
 @dataclass
 class WebArgs(PolicyArgs):
     """Arguments of the command line."""
 
-    out: Path = Path("web/assets")
+    out: Path = _ASSETS
     """Directory of the page's assets, whose files are replaced."""
     also: tuple[Path, ...] = ()
     """Checkpoints of further policies for the page's list of controllers, each of a task of its
@@ -37,10 +40,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status.
 
     Raises:
-        MuteError: If the policy cannot be used, or a file cannot be written.
+        MuteError: If the policy cannot be used, a file cannot be written, or the page that it is
+            for is not here.
     """
     argv = command_line() if argv is None else argv
     args = parse(WebArgs, argv, "Write what the page in web/ needs of Python.")
+    if args.out == _ASSETS and not _PAGE.is_file():
+        raise MuteError(
+            f"--out {_ASSETS}: the page is not here ({_PAGE} is missing); it comes with the "
+            "checkout, not with the package: run this in its folder, or name another directory"
+        )
     args = args.with_policy_found()
     policy = _audible(args.policy)
     others = [_audible(path) for path in args.also]

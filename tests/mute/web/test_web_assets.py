@@ -103,6 +103,15 @@ def test_a_policy_that_is_missing_is_told_of_in_one_line(tmp_path: Path):
         main(["--policy", str(tmp_path / "nowhere.pt"), "--out", str(tmp_path)])
 
 
+def test_where_the_page_is_not_nothing_is_made_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(MuteError, match=r"the page is not here \(web/package\.json is missing\)"):
+        main([])
+    assert not list(tmp_path.iterdir())
+
+
 def test_further_policies_come_into_the_list_of_controllers_unless_their_task_is_taken(
     tmp_path: Path,
 ):
