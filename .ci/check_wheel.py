@@ -112,7 +112,8 @@ def check_contents(archive: Path, wheel: Path) -> None:
     inside = [path.relative_to(path.parts[0]).as_posix() for path in files]
     about = [name for name in inside if not name.startswith("src/mute/")]
     expect(archive.name, Counter(inside), Counter([*(f"src/{name}" for name in package), *about]))
-    strange = [name for name in about if name.startswith(("tests", "docs", "envs", "networks"))]
+    others = ("tests", "docs", "envs", "networks", "web")
+    strange = [name for name in about if name.startswith(others)]
     assert not strange, f"{archive.name} holds {strange}"
 
 
@@ -151,6 +152,8 @@ def use(python: Path, user: Path) -> None:
     assert "laeq" in levels.lower(), levels
     run(user, programs / "mute-export", "--policy", policy, "--out", "policy.onnx")
     assert (user / "policy.onnx").stat().st_size > 100_000
+    run(user, python, "-m", "mute.web", "--out", "assets")
+    assert (user / "assets" / "page.json").is_file()
     short = ("--trials", "1", "--seconds", "1.5", "--beta", "0", "--out", "evaluation")
     run(user, programs / "mute-evaluate", "noise", "--surface", "wood", *short)
     options = ("--iterations", "1", "--num-envs", "16", "--plain", "--log-dir", "runs")

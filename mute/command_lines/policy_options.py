@@ -21,7 +21,7 @@ from mute.support.errors import MuteError
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK, make_task
 
-__all__ = ["DriverArgs", "PolicyArgs", "check_audible"]
+__all__ = ["DriverArgs", "PolicyArgs", "check_audible", "policies_that_ship"]
 
 
 _SHIPPED = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
@@ -156,6 +156,11 @@ def check_audible(driver: Driver, name: str) -> None:
         listening_cfg(driver.cfg.env)
     except ValueError as error:
         raise MuteError(f"{name} cannot be heard: {error}") from error
+
+
+def policies_that_ship() -> list[Path]:
+    """Return the policies that come with the package, each of a task of its own, by their names."""
+    return sorted(_SHIPPED.parent.glob("*.pt"))
 
 
 def _that_ships(task: str) -> Path:

@@ -27,7 +27,7 @@ from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.terrain import TerrainCfg
 from mute.evaluation.trials import evaluation_cfg, from_the_stance, run_trial
 from mute.support.files import write_file
-from mute.support.plain_data import without_nan
+from mute.support.plain_data import laid_out, without_nan
 from mute.support.provenance import file_sha256
 
 __all__ = ["OnnxController", "write_reference"]
@@ -131,8 +131,7 @@ def write_reference(policy: Policy, policy_file: Path, out: Path) -> list[Path]:
             acted = b"".join(part.astype("<f4").tobytes() for part in rows)
     onnx_file.unlink()
     content = {"policy_sha256": file_sha256(policy_file), "walks": without_nan(walks)}
-    text = json.dumps(content, allow_nan=False) + "\n"
-    files = {"walks.json": text.encode(), "acted.bin": acted}
+    files = {"walks.json": (laid_out(content) + "\n").encode(), "acted.bin": acted}
     for name, data in files.items():
         write_file(out / name, data)
     return [out / name for name in files]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import gzip
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,6 +35,7 @@ from mute.evaluation.session import Session
 from mute.evaluation.usual_robots import robots_cfg
 from mute.support.errors import MuteError
 from mute.support.files import write_file
+from mute.support.plain_data import laid_out
 from mute.support.provenance import file_sha256
 from mute.web.sound_tables import SAMPLE_RATE
 
@@ -125,8 +125,7 @@ def write_sound_references(policy: Policy, policy_file: Path, out: Path) -> list
         "meter": _metered(),
         "walks": walks,
     }
-    text = json.dumps(content, allow_nan=False, indent=1) + "\n"
-    files["references.json"] = text.encode()
+    files["references.json"] = (laid_out(content) + "\n").encode()
     for name, data in files.items():
         write_file(out / name, data)
     return [out / name for name in files]

@@ -11,13 +11,14 @@ import { readFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { chromium } from "playwright-core";
+import { WEB } from "./places.mjs";
 
 const [out] = process.argv.slice(2);
 if (!out) {
   console.error("name the film: node build/film.mjs OUT.webp");
   process.exit(2);
 }
-const dist = new URL("../dist", import.meta.url).pathname;
+const dist = join(WEB, "dist");
 const types = {
   html: "text/html",
   js: "text/javascript",
@@ -66,7 +67,7 @@ for (let picture = 0; picture < PICTURES; picture++) {
 }
 await browser.close();
 server.close();
-const encode = new URL("encode_film.py", import.meta.url).pathname;
+const encode = join(WEB, "build", "encode_film.py");
 const python = process.env.PYTHON ?? "python";
 const run = spawnSync(python, [encode, frames, out, String(PERIOD)], { stdio: "inherit" });
 rmSync(frames, { recursive: true });

@@ -1,27 +1,31 @@
 /** Bundles the tests, which are TypeScript, and runs them: node build/test.mjs node|browser [file]. */
 
-import { spawnSync } from "node:child_process";
 import { readdirSync, rmSync } from "node:fs";
 import { join } from "node:path";
 import { build } from "esbuild";
+import { WEB } from "./places.mjs";
+import { runFiles } from "./run_files.mjs";
 
-const [kind = "node", only = ""] = process.argv.slice(2);
-const root = new URL("..", import.meta.url).pathname;
-const out = join(root, ".test", kind);
+/**
+ * What ends the names of each kind, whether their files run together (one browser at a time, or each
+ * would slow the other down), and the longest time of a file, ms, with much else to do.
+ */
+const KINDS = {
+  node: { suffix: ".test.ts", together: true, limit: 600_000 },
+  browser: { suffix: ".browser.ts", together: false, limit: 1_200_000 },
+};
 
-function tests(folder) {
-  return readdirSync(join(root, folder), { withFileTypes: true, recursive: false }).flatMap(
-    (entry) => (entry.isDirectory() ? tests(join(folder, entry.name)) : [join(folder, entry.name)]),
-  );
-}
-
-const suffix = kind === "browser" ? ".browser.ts" : ".test.ts";
-const files = tests("test").filter((file) => file.endsWith(suffix) && file.includes(only));
+const [name = "node", only = ""] = process.argv.slice(2);
+const kind = Object.hasOwn(KINDS, name) ? KINDS[name] : fail(`node or browser, not ${name}`);
+process.chdir(WEB); // where tests look for assets, dist and references
+const files = tests("test").filter((file) => file.endsWith(kind.suffix) && file.includes(only));
+if (!files.length) fail(`no file of the ${name} tests has ${only} in its name`);
+const out = join(".test", name);
 rmSync(out, { recursive: true, force: true });
 await build({
-  entryPoints: files.map((file) => join(root, file)),
+  entryPoints: files,
   outdir: out,
-  outbase: join(root, "test"),
+  outbase: "test",
   outExtension: { ".js": ".mjs" },
   bundle: true,
   platform: "node",
@@ -29,12 +33,20 @@ await build({
   packages: "external",
   sourcemap: "inline",
   logLevel: "warning",
-});
-const built = files.map((file) => join(out, file.replace(/^test\//, "").replace(/\.ts$/, ".mjs")));
-// One browser at a time, or each would slow the other down.
-const runs = kind === "browser" ? built.map((file) => [file]) : [built];
-const failed = runs.filter((part) => {
-  const words = ["--enable-source-maps", "--test", ...part];
-  return spawnSync(process.execPath, words, { cwd: root, stdio: "inherit" }).status !== 0;
-});
+}).catch(() => process.exit(1)); // esbuild has told what is wrong
+const built = files.map((file) => join(out, file.replace(/^test./, "").replace(/\.ts$/, ".mjs")));
+const failed = await runFiles(built, kind);
+console.log(failed.length ? `failed: ${failed.join(", ")}` : "all files passed");
 process.exit(failed.length ? 1 : 0);
+
+function tests(folder) {
+  return readdirSync(folder, { withFileTypes: true }).flatMap((entry) => {
+    const path = join(folder, entry.name);
+    return entry.isDirectory() ? tests(path) : [path];
+  });
+}
+
+function fail(line) {
+  console.error(line);
+  process.exit(2);
+}

@@ -12,12 +12,14 @@ import mujoco
 import numpy as np
 import onnxruntime
 import pytest
+from dreamwaq_helpers import write_dreamwaq_policy
 from places import REPOSITORY, RESOURCES
 
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
 from mute.acoustics.recorder import AT_LIMIT, RELEASE
 from mute.checkpoint import load_checkpoint, save_checkpoint
+from mute.command_lines.policy_options import policies_that_ship
 from mute.command_lines.web import main
 from mute.controllers import load_policy
 from mute.envs.quadruped_env import QuadrupedEnv, scene_of
@@ -121,6 +123,15 @@ def test_a_policy_that_is_missing_is_told_of_in_one_line(tmp_path: Path):
         main(["--policy", str(tmp_path / "nowhere.pt"), "--out", str(tmp_path)])
 
 
+def test_where_the_page_is_not_nothing_is_made_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(MuteError, match=r"the page is not here \(web/package\.json is missing\)"):
+        main([])
+    assert not list(tmp_path.iterdir())
+
+
 def test_further_policies_come_into_the_list_of_controllers_unless_their_task_is_taken(
     tmp_path: Path,
 ):
@@ -135,3 +146,25 @@ def test_further_policies_come_into_the_list_of_controllers_unless_their_task_is
         ("go1_other", "go1_other.onnx"),
     ]
     assert (tmp_path / "go1_other.onnx").is_file()
+
+
+def test_every_policy_that_ships_comes_into_the_list_unless_its_task_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    one = write_dreamwaq_policy(tmp_path / "go1_dreamwaq.pt")
+    monkeypatch.setattr("mute.command_lines.web.policies_that_ship", lambda: [one, SHIPPED])
+    for words, names in (
+        ([], ["go1_mute", "go1_dreamwaq"]),
+        (["--policy", str(one)], ["go1_dreamwaq", "go1_mute"]),
+    ):
+        out = tmp_path / "assets"
+        assert main(["--out", str(out), *words]) == 0
+        controllers = json.loads((out / "page.json").read_text())["controllers"]
+        assert [controller["name"] for controller in controllers] == names
+        named = {"name": "go1_dreamwaq", "label": "DreamWaQ", "file": "go1_dreamwaq.onnx"}
+        assert named in controllers
+
+
+def test_policies_that_ship_are_all_of_the_resources():
+    assert SHIPPED in policies_that_ship()
+    assert policies_that_ship() == sorted((RESOURCES / "go1").glob("*.pt"))

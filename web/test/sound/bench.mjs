@@ -3,16 +3,16 @@
 import { spawnSync } from "node:child_process";
 import { join } from "node:path";
 import { build } from "esbuild";
+import { WEB } from "../../build/places.mjs";
 
-const root = new URL("../..", import.meta.url).pathname;
-const outfile = join(root, ".test", "bench", "sound.mjs");
+const outfile = join(WEB, ".test", "bench", "sound.mjs");
 await build({
-  entryPoints: [join(root, "test/sound/benchmark.ts")],
+  entryPoints: [join(WEB, "test/sound/benchmark.ts")],
   outfile,
   bundle: true,
   platform: "node",
   format: "esm",
   logLevel: "warning",
 });
-const run = spawnSync(process.execPath, [outfile], { cwd: root, stdio: "inherit" });
+const run = spawnSync(process.execPath, [outfile], { cwd: WEB, stdio: "inherit" });
 process.exit(run.status ?? 1);
