@@ -118,6 +118,9 @@ _FIGURES = {
 }
 """Columns of the table, and the figures that they show."""
 
+_NOTHING = "none"
+"""What stands where no seed has a figure."""
+
 _KEPT = ("beta", "beta_levels")
 """Tables that are kept beside the figures."""
 
@@ -208,7 +211,8 @@ def table(directory: Path, levers: Sequence[str], seeds: Sequence[int]) -> list[
         rows.append(
             {"lever": lever, "seeds": len(found), "targets met": _spread(met)} | spread | heard
         )
-    return rows
+    empty = [title for title in _HEARD if all(row[title] == _NOTHING for row in rows)]
+    return [{title: cell for title, cell in row.items() if title not in empty} for row in rows]
 
 
 def _heard(content: Mapping[str, Any], kept: str, beta: float, column: str) -> float | None:
@@ -315,7 +319,7 @@ def _spread(values: Sequence[float | None]) -> str:
     """Return a mean with the smallest and the largest; None is a figure that there is not."""
     numbers = [value for value in values if value is not None]
     if not numbers:
-        return "none"
+        return _NOTHING
     low, high = min(numbers), max(numbers)
     missing = f", {len(values) - len(numbers)} without" if len(numbers) < len(values) else ""
     return f"{statistics.fmean(numbers):.3g} ({low:.3g} to {high:.3g}{missing})"
