@@ -1,5 +1,8 @@
 """Take the recipe's parts away, one at a time: python -m benchmarks.levers --out docs/levers.
 
+Beside its parts there are the paper's questions (what the phase, the LSTM and the symmetry are
+worth) and the quiet terms that others have used, each by the same recipe.
+
 Each part is left out, or made stronger, by flags of `train.py`, trained with several seeds, and
 judged by the targets of `evaluate.py reliability`. One luck is not a finding: what counts is the
 mean over the seeds and their spread. Physics steps are 10 ms, half as many as the recipe's, which
@@ -40,29 +43,69 @@ from mute.support.programs import run_program
 from mute.support.ranges import Range
 from mute.tasks import DEFAULT_TASK, make_task
 
-__all__ = ["LEVERS", "LeversArgs", "main", "table"]
+__all__ = ["ABLATIONS", "LEVERS", "PARTS", "QUIET_TERMS", "Lever", "LeversArgs", "main", "table"]
 
 _ROOT = Path(__file__).resolve().parents[1]
-_TERM = "--env.rewards.terms.{}.weight 0"
 
-LEVERS: Mapping[str, str] = {
-    "recipe": "",
-    "no_leading_side": "--agent.no-leading-side",
-    "no_go_signal": "--agent.no-go-signal",
-    "no_settling": "--agent.settling-share 0",
-    "no_following": f"{_TERM.format('lin_vel_following')} {_TERM.format('ang_vel_following')}",
-    "no_stepping": _TERM.format("stepping"),
-    "no_soft_steps": _TERM.format("soft_steps"),
-    "no_stamping": _TERM.format("stamping"),
-    "no_stillness": f"{_TERM.format('stand_still')} {_TERM.format('feet_lifted')}",
-    "at_once": "--env.rewards.following-acceleration 0 --env.rewards.following-time 0",
-    "no_beta_ends": "--env.commands.beta-end-fraction 0",
-    "no_slow_commands": "--env.commands.slow-fraction 0 --env.commands.single-axis-fraction 0",
-    "rare_stops": "--env.commands.standing-fraction 0.05 --env.commands.resampling-time 10",
-    "no_pushes": "--env.randomization.push-velocity 0",
-    "harder_pushes": ("--env.randomization.push-velocity 0.7 --env.randomization.push-interval 3"),
+
+@dataclass(frozen=True)
+class Lever:
+    """What a training does without, has more of, or has instead."""
+
+    flags: str = ""
+    """Flags of `train.py`."""
+    task: str = DEFAULT_TASK
+    """The task that they change."""
+
+
+def _without(*terms: str) -> str:
+    return " ".join(f"--env.rewards.terms.{term}.weight 0" for term in terms)
+
+
+_PAPERS_PHASE_TERMS = ("foot_drop_velocity", "foot_raise_velocity")
+
+PARTS: Mapping[str, Lever] = {
+    "recipe": Lever(),
+    "no_leading_side": Lever("--agent.no-leading-side"),
+    "no_go_signal": Lever("--agent.no-go-signal"),
+    "no_settling": Lever("--agent.settling-share 0"),
+    "no_following": Lever(_without("lin_vel_following", "ang_vel_following")),
+    "no_stepping": Lever(_without("stepping")),
+    "no_soft_steps": Lever(_without("soft_steps")),
+    "no_stamping": Lever(_without("stamping")),
+    "no_stillness": Lever(_without("stand_still", "feet_lifted")),
+    "at_once": Lever("--env.rewards.following-acceleration 0 --env.rewards.following-time 0"),
+    "no_beta_ends": Lever("--env.commands.beta-end-fraction 0"),
+    "no_slow_commands": Lever(
+        "--env.commands.slow-fraction 0 --env.commands.single-axis-fraction 0"
+    ),
+    "rare_stops": Lever("--env.commands.standing-fraction 0.05 --env.commands.resampling-time 10"),
+    "no_pushes": Lever("--env.randomization.push-velocity 0"),
+    "harder_pushes": Lever(
+        "--env.randomization.push-velocity 0.7 --env.randomization.push-interval 3"
+    ),
 }
-"""What each training does without, or has more of, as flags of `train.py`."""
+"""The recipe's parts."""
+
+ABLATIONS: Mapping[str, Lever] = {
+    "no_phase_terms": Lever(_without(*_PAPERS_PHASE_TERMS)),
+    "no_quiet_terms": Lever(
+        _without(*_PAPERS_PHASE_TERMS, "near_ground_drop", "landing_speed", "soft_steps")
+    ),
+    "true_phase": Lever("--env.rewards.phase-source true"),
+    "no_phase_in_actor": Lever("--agent.estimation.no-actor-uses-phase"),
+    "no_lstm": Lever("--agent.estimation.network.encoder history"),
+    "no_symmetry": Lever("--agent.no-symmetric"),
+}
+"""The paper's questions."""
+
+QUIET_TERMS: Mapping[str, Lever] = {
+    name: Lever(task=f"go1_{name}")
+    for name in ("quiet_phase", "quiet_landing_speed", "quiet_landing_load", "quiet_speed_change")
+}
+"""What others are quiet by, in place of the recipe's own terms."""
+
+LEVERS: Mapping[str, Lever] = {**PARTS, **ABLATIONS, **QUIET_TERMS}
 
 _PHYSICS = "--env.scene.timestep 0.01 --env.decimation 2"
 
@@ -75,13 +118,29 @@ _FIGURES = {
 }
 """Columns of the table, and the figures that they show."""
 
+_NOTHING = "none"
+"""What stands where no seed has a figure."""
+
+_KEPT = ("beta", "beta_levels")
+"""Tables that are kept beside the figures."""
+
+_HEARD = {
+    f"{title}, beta {beta:.0f}": (kept, beta, column)
+    for title, kept, column in (
+        ("landing speed at 0.5 m/s, m/s", "beta", "landing_speed_rms"),
+        ("MNL at 0.5 m/s, dBA", "beta_levels", "mnl"),
+    )
+    for beta in (0.0, 1.0)
+}
+"""More columns: the kept table, quiet factor and column that they show."""
+
 
 @dataclass
 class LeversArgs:
     """Arguments of the comparison."""
 
-    levers: Words = tuple(LEVERS)
-    """Which of them."""
+    levers: Words = tuple(PARTS)
+    """Which of them: the recipe's parts, or any others."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Seeds to train each with."""
     robots: int = 64
@@ -146,8 +205,23 @@ def table(directory: Path, levers: Sequence[str], seeds: Sequence[int]) -> list[
             title: _spread([one[name]["value"] for one in figures])
             for title, name in _FIGURES.items()
         }
-        rows.append({"lever": lever, "seeds": len(found), "targets met": _spread(met)} | spread)
-    return rows
+        heard = {
+            title: _spread([_heard(one, *at) for one in found]) for title, at in _HEARD.items()
+        }
+        rows.append(
+            {"lever": lever, "seeds": len(found), "targets met": _spread(met)} | spread | heard
+        )
+    empty = [title for title in _HEARD if all(row[title] == _NOTHING for row in rows)]
+    return [{title: cell for title, cell in row.items() if title not in empty} for row in rows]
+
+
+def _heard(content: Mapping[str, Any], kept: str, beta: float, column: str) -> float | None:
+    """Return what was measured at 0.5 m/s, or None where it was not, or not kept."""
+    at = {"speed": 0.5, "beta": beta}
+    for row in content.get("tables", {}).get(kept, ()):
+        if {name: row[name] for name in at} == at:
+            return row[column]
+    return None
 
 
 def _figures(path: Path, content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
@@ -175,10 +249,10 @@ def _check(args: LeversArgs) -> None:
 
 def _conditions(lever: str, args: LeversArgs) -> dict[str, Any]:
     """Return what a training and its judgement depend on, but for the seed and the code."""
-    recipe = make_task(DEFAULT_TASK)
+    recipe = make_task(LEVERS[lever].task)
     return {
         "recipe": hashlib.sha256(json.dumps(to_plain(recipe)).encode()).hexdigest()[:8],
-        "flags": f"{LEVERS[lever]} {_PHYSICS}".split(),
+        "flags": f"{LEVERS[lever].flags} {_PHYSICS}".split(),
         "iterations": args.iterations or recipe.agent.iterations,
         "robots": args.robots,
     }
@@ -196,10 +270,12 @@ def _check_same(args: LeversArgs) -> None:
         args.out / f"{lever}.{seed}.json": lever for lever in args.levers for seed in args.seeds
     }
     files = {path: read_json(path) for path in paths if path.exists()}
-    first = next(iter(files.values()), {})
-    kept = {name: first[name] for name in ("recipe", "iterations") if name in first}
+    firsts: dict[str, Mapping[str, Any]] = {}
     for path, found in files.items():
-        conditions = _conditions(paths[path], args) | (kept if args.table else {})
+        conditions = _conditions(paths[path], args)
+        first = firsts.setdefault(LEVERS[paths[path]].task, found)
+        if args.table:
+            conditions |= {name: first[name] for name in ("recipe", "iterations") if name in first}
         for name, value in conditions.items():
             if found.get(name) != value:
                 raise MuteError(f"{path} has {name} {found.get(name)}, not {value}; move it away")
@@ -208,8 +284,8 @@ def _check_same(args: LeversArgs) -> None:
 def _judged(lever: str, seed: int, args: LeversArgs) -> dict[str, Any]:
     """Train without a lever, and return how reliable the walk is."""
     conditions = _conditions(lever, args)
-    iterations, flags = conditions["iterations"], conditions["flags"]
-    run = args.log_dir / DEFAULT_TASK / f"{lever}.{seed}.{iterations}.{conditions['recipe']}"
+    iterations, flags, task = conditions["iterations"], conditions["flags"], LEVERS[lever].task
+    run = args.log_dir / task / f"{lever}.{seed}.{iterations}.{conditions['recipe']}"
     policy = run / f"model_{iterations - 1}.pt"
     if not policy.exists():
         saved = newest_checkpoint(run) if run.is_dir() else None
@@ -218,12 +294,13 @@ def _judged(lever: str, seed: int, args: LeversArgs) -> dict[str, Any]:
         begin = ["--resume", str(saved)] if saved else ["--seed", str(seed)]
         place = [] if saved else ["--log-dir", str(args.log_dir), "--run-name", run.name]
         size = ["--iterations", str(iterations)]
-        _run("train.py", "--task", DEFAULT_TASK, "--plain", *begin, *place, *size, *flags)
+        _run("train.py", "--task", task, "--plain", *begin, *place, *size, *flags)
     found = run / "reliability"
     counts = ["--robots", str(args.robots)]
     _run("evaluate.py", "reliability", "--policy", str(policy), *counts, "--out", str(found))
     content = read_json(found / "reliability.json")
-    del content["tables"], content["policy"]
+    del content["policy"]
+    content["tables"] = {name: content["tables"].get(name, []) for name in _KEPT}
     return {"lever": lever} | content | conditions
 
 
@@ -242,7 +319,7 @@ def _spread(values: Sequence[float | None]) -> str:
     """Return a mean with the smallest and the largest; None is a figure that there is not."""
     numbers = [value for value in values if value is not None]
     if not numbers:
-        return "none"
+        return _NOTHING
     low, high = min(numbers), max(numbers)
     missing = f", {len(values) - len(numbers)} without" if len(numbers) < len(values) else ""
     return f"{statistics.fmean(numbers):.3g} ({low:.3g} to {high:.3g}{missing})"

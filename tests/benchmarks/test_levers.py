@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -18,28 +19,40 @@ from mute.tasks import DEFAULT_TASK, make_task
 
 @pytest.mark.parametrize("lever", [name for name in LEVERS if name != "recipe"])
 def test_each_lever_changes_what_the_recipe_has(lever):
-    fields = flat_fields(make_task(DEFAULT_TASK))
-    words = LEVERS[lever].split()
+    assert LEVERS[lever].flags or LEVERS[lever].task != DEFAULT_TASK
+    fields = flat_fields(make_task(LEVERS[lever].task))
+    words = LEVERS[lever].flags.split()
     while words:
-        option = words.pop(0).removeprefix("--")
-        path = option.replace("agent.no-", "agent.").replace("-", "_")
-        taken = False if path != option.replace("-", "_") else float(words.pop(0))
+        option = words.pop(0).removeprefix("--").replace("-", "_")
+        path = re.sub(r"\.no_(?=\w+$)", ".", option)
+        taken = False if path != option else type(fields[path])(words.pop(0))
         assert fields[path] != taken, path
 
 
 def test_a_recipe_with_rare_stops_has_fewer_of_them_and_holds_commands_longer():
     commands = make_task(DEFAULT_TASK).env.commands
-    words = LEVERS["rare_stops"].split()
+    words = LEVERS["rare_stops"].flags.split()
     told = {option: float(value) for option, value in zip(words[::2], words[1::2], strict=True)}
     assert told["--env.commands.standing-fraction"] < commands.standing_fraction
     assert told["--env.commands.resampling-time"] > commands.resampling_time
+
+
+_TABLES = {
+    "starts": [{"beta": 0.0}],
+    "beta": [
+        {"speed": speed, "beta": beta, "landing_speed_rms": speed + beta}
+        for speed in (0.3, 0.5)
+        for beta in (0.0, 0.5, 1.0)
+    ],
+    "beta_levels": [{"beta": 0.0, "speed": 0.5, "mnl": 70.0}],
+}
 
 
 def _content(met: int, starts: float | None) -> dict[str, Any]:
     names = list(levers._FIGURES.values())
     figures = [{"name": name, "value": 0.5, "met": index < met} for index, name in enumerate(names)]
     figures[0]["value"] = starts
-    return {"figures": figures, "tables": {"starts": []}, "policy": "somewhere"}
+    return {"figures": figures, "tables": _TABLES, "policy": "somewhere"}
 
 
 class _Programs:
@@ -85,12 +98,27 @@ def test_each_is_trained_and_judged_once(programs, tmp_path, capsys):
     assert training[training.index("--seed") + 1] == "1"
     kept = json.loads((tmp_path / "found/no_go_signal.1.json").read_text())
     assert kept["flags"][0] == "--agent.no-go-signal"
-    assert "tables" not in kept
+    assert list(kept["tables"]) == ["beta", "beta_levels"]
     capsys.readouterr()
     assert _main(tmp_path, *words) == 0
     assert len(programs.commands) == 4
     [row] = json.loads(capsys.readouterr().out)
     assert (row["seeds"], row["targets met"]) == (2, "2 (2 to 2)")
+    assert row["landing speed at 0.5 m/s, m/s, beta 1"] == "1.5 (1.5 to 1.5)"
+    assert row["MNL at 0.5 m/s, dBA, beta 0"] == "70 (70 to 70)"
+    assert "MNL at 0.5 m/s, dBA, beta 1" not in row  # measured in neither
+
+
+def test_a_lever_of_another_task_trains_that_one(programs, tmp_path):
+    words = ("--levers", "recipe", "quiet_phase", "--seeds", "0")
+    assert _main(tmp_path, *words) == 0
+    trained = programs.commands[2]
+    assert trained[trained.index("--task") + 1] == "go1_quiet_phase"
+    first, second = (
+        json.loads((tmp_path / f"found/{lever}.0.json").read_text()) for lever in words[1:3]
+    )
+    assert first["recipe"] != second["recipe"]
+    assert _main(tmp_path, *words, "--table") == 0
 
 
 def test_a_training_that_was_stopped_goes_on_from_its_last_checkpoint(programs, tmp_path):
