@@ -37,22 +37,27 @@ class Picture:
         self._boxes = [self.model.geom(GROUND_BOX.format(index)).id for index in range(count)]
         self._laid: tuple[object, ...] = ()
 
-    def show(self, robot: int) -> None:
-        """Take on the positions of one of the robots, and its ground."""
+    def show(self, robot: int) -> bool:
+        """Take on the positions of one of the robots, and its ground.
+
+        Returns:
+            Whether the ground lies otherwise than before.
+        """
         qpos = self._env.simulation.qpos[robot]
-        self._lay(robot, qpos[:2])
+        laid = self._lay(robot, qpos[:2])
         self.data.qpos[:] = qpos.numpy(force=True)
         mujoco.mj_forward(self.model, self.data)
+        return laid
 
-    def _lay(self, robot: int, xy: torch.Tensor) -> None:
-        """Lay what is seen of the ground, unless it lies there."""
+    def _lay(self, robot: int, xy: torch.Tensor) -> bool:
+        """Lay what is seen of the ground, unless it lies there; return whether it did not."""
         ground = self._env.ground
         if not isinstance(ground, BoxGround):
-            return
+            return False
         cell = torch.floor(xy / TREAD).tolist()
         place = (robot, int(ground.level[robot]), int(ground.key[robot]), *cell)
         if place == self._laid:
-            return
+            return False
         self._laid = place
         laid, base = ground.drawn(robot, xy)
         model, boxes = self.model, self._boxes[: laid.pos.shape[1]]
@@ -64,3 +69,4 @@ class Picture:
         model.geom_quat[boxes] = 0.0
         model.geom_quat[boxes, 0] = torch.cos(0.5 * laid.pitch[0])
         model.geom_quat[boxes, 2] = torch.sin(0.5 * laid.pitch[0])
+        return True

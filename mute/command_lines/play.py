@@ -27,6 +27,7 @@ from mute.command_lines.arguments import (
     command_line,
     parse,
 )
+from mute.command_lines.play_choices import check_page, page_choices, with_all_sensors
 from mute.command_lines.play_figures import live_captions, report, summary
 from mute.command_lines.policy_options import DriverArgs
 from mute.command_lines.sound_options import (
@@ -110,8 +111,15 @@ class PlayArgs(DriverArgs):
     """Keep the modelled sound of the first robot in this .wav file."""
     video: Path | None = None
     """Film to this .mp4 file, with sound, without a window."""
-    viewer: Literal["auto", "native", "none"] = "auto"
-    """native opens a window, none does not, auto does where there is a display."""
+    viewer: Literal["auto", "native", "web", "none"] = "auto"
+    """native opens a window, auto does where there is a display; web serves a page to watch and
+    steer in from any browser, until Ctrl-C or for --seconds; none does neither."""
+    host: str = "127.0.0.1"
+    """Address that the page of --viewer web listens at; 0.0.0.0 is seen from other machines."""
+    port: int = 8080
+    """Port of that page; where it is taken, the next free one."""
+    policies: tuple[Path, ...] = ()
+    """Further policies that can be chosen in the page while it walks."""
     look: Look = "primitives"
     """The robot's look; menagerie needs the package mujoco_menagerie."""
     json: bool = False
@@ -141,6 +149,11 @@ class PlayArgs(DriverArgs):
         find_microphone(self.microphone)
         if self.video and self.viewer == "native":
             raise MuteError("--video films without a window, so not with --viewer native")
+        if self.video and self.viewer == "web":
+            raise MuteError("--video films as fast as it can, so not with --viewer web")
+        check_option("port", self.port, Range(1, 65535, whole=True))
+        if self.policies and self.viewer != "web":
+            raise MuteError("--policies are for --viewer web alone")
 
     @property
     def command(self) -> Command:
@@ -182,11 +195,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _play(args: PlayArgs) -> tuple[Session, int]:
     """Walk as asked and return the walk and the exit status."""
     use_collection_threads()
-    in_window = _wants_window(args)
-    session = _make_session(args, endless=in_window and args.seconds is None)
+    in_page, in_window = args.viewer == "web", _wants_window(args)
+    if in_page:
+        check_page()
+    endless = (in_page or in_window) and args.seconds is None
+    session = _make_session(args, endless)
     status = 0
     try:
-        if in_window:
+        if in_page:
+            _walk_in_page(args, session)
+        elif in_window:
             _walk_in_window(args, session)
         elif args.video:
             _walk_on_video(args, session, args.video)
@@ -219,7 +237,7 @@ def _wants_window(args: PlayArgs) -> bool:
     Raises:
         MuteError: If one is asked for and none can open.
     """
-    if args.viewer == "none" or args.video:
+    if args.viewer in ("none", "web") or args.video:
         return False
     reason = why_no_window(os.environ, sys.platform)
     if reason is None:
@@ -259,6 +277,8 @@ def _make_env(args: PlayArgs, policy: Driver, seconds: float) -> QuadrupedEnv:
     # All walk along x, so that the camera has the same view of every walk.
     scene = dataclasses.replace(cfg.scene, look=args.look)
     cfg = dataclasses.replace(cfg, random_heading=False, scene=scene)
+    if args.viewer == "web":
+        cfg = with_all_sensors(cfg)
     if args.floor or not args.json:
         try:
             cfg = audible_cfg(cfg, args.floor)
@@ -301,6 +321,24 @@ def _walk_in_window(args: PlayArgs, session: Session) -> None:
     num_steps = None if args.seconds is None else _num_steps(args, session)
     with session.listener or contextlib.nullcontext():
         watch(session, num_steps, shown, _height_dots(args, session))
+
+
+def _walk_in_page(args: PlayArgs, session: Session) -> None:
+    """Serve a page to watch and steer in, until the time is over or an interrupt comes."""
+    from mute.live.page import page_server, show_page  # viser takes a second
+
+    num_steps = None if args.seconds is None else _num_steps(args, session)
+    choices = page_choices(args, args.policies, session)
+    with session.listener or contextlib.nullcontext(), page_server(args.host, args.port) as server:
+        print(f"watch and steer at http://{args.host}:{server.get_port()}", flush=True)
+        show_page(
+            server,
+            session,
+            num_steps,
+            lambda: live_captions(session),
+            choices,
+            _height_dots(args, session),
+        )
 
 
 def _height_dots(args: PlayArgs, session: Session) -> HeightDots | None:

@@ -6,6 +6,8 @@ are `mute.evaluation`'s.
 
 from __future__ import annotations
 
+import torch
+
 from mute.acoustics.live_listener import LiveListener
 from mute.controllers import Controller
 from mute.controllers.command import Command
@@ -73,6 +75,26 @@ class Session:
         else:
             self._going = now
             self.set_command(Command(0.0, 0.0, 0.0, now.beta))
+
+    def drive_with(self, controller: Controller) -> None:
+        """Let something else drive from the next step on, without a past; robots go on as they are.
+
+        Args:
+            controller: Drives as many robots.
+        """
+        controller.reset()
+        self.controller = controller
+
+    def push(self, forward: float, left: float) -> None:
+        """Push all robots at once.
+
+        Args:
+            forward: Change of the trunk's velocity along its heading, m/s.
+            left: The same to its left, m/s.
+        """
+        ahead = self.env.heading
+        across = torch.stack((-ahead[:, 1], ahead[:, 0]), dim=1)
+        self.env.simulation.qvel[:, :2] += forward * ahead + left * across
 
     def restart(self) -> None:
         """Begin anew: robots, figures and time."""

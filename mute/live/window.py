@@ -19,13 +19,11 @@ import mujoco.viewer
 from mute.envs.picture import Picture
 from mute.evaluation.session import Session
 from mute.live.keys import press
+from mute.live.pace import wait_until
 from mute.rendering.height_dots import HeightDots
 from mute.support.errors import MuteError
 
 __all__ = ["watch"]
-
-_MAX_LAG = 0.1
-"""Lag behind real time from which on it is given up to catch up, s."""
 
 _CLOSING_TIME = 5.0
 """Longest time that a window may take to close, s."""
@@ -70,7 +68,7 @@ def watch(
                 shown = captions()
                 viewer.set_texts((None, None, "\n".join(shown), "\n".join(shown.values())))
             viewer.sync()
-            due = _wait(due + env.step_dt)
+            due = wait_until(due + env.step_dt)
 
 
 @contextlib.contextmanager
@@ -93,12 +91,3 @@ def _open(
         # The thread that draws still cleans up; the process must not end under it.
         for thread in threads:
             thread.join(_CLOSING_TIME)
-
-
-def _wait(due: float) -> float:
-    """Sleep until a time and return it, or the present where it is too far in the past."""
-    now = time.perf_counter()
-    if now < due:
-        time.sleep(due - now)
-        return due
-    return due if now - due < _MAX_LAG else now

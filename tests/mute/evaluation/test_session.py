@@ -53,6 +53,31 @@ def test_a_robot_that_falls_goes_on_with_the_same_command_and_no_past():
     assert session.gait().fall_rate == 0.5
 
 
+def test_a_push_changes_the_velocity_along_the_heading_and_to_its_left():
+    session = _make_session()
+    env = session.env
+    before = env.simulation.qvel[:, :2].clone()
+    session.push(0.3, -0.4)
+    change = (env.simulation.qvel[:, :2] - before).float()
+    ahead = env.heading
+    across = torch.stack((-ahead[:, 1], ahead[:, 0]), dim=1)
+    close = torch.testing.assert_close
+    close((change * ahead).sum(dim=1), torch.full((2,), 0.3))
+    close((change * across).sum(dim=1), torch.full((2,), -0.4))
+    assert (ahead - torch.tensor([1.0, 0.0])).abs().max() > 0.1  # not the world's axes
+
+
+def test_what_drives_can_be_changed_while_it_walks():
+    session = _make_session()
+    session.step()
+    other = Standing(2)
+    session.drive_with(other)
+    session.step()
+    assert session.controller is other
+    assert other.resets[0] is None  # it begins without a past
+    assert session.steps == 2
+
+
 def test_a_restart_forgets_figures_and_time_but_not_the_command():
     session = _make_session()
     session.set_command(Command(0.1, 0.2, 0.3, 0.4))
