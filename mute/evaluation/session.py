@@ -61,8 +61,15 @@ class Session:
         """Time walked since the start, s."""
         return self.steps * self.env.step_dt
 
+    @property
+    def figures_from(self) -> float:
+        """Time at which the figures began, s: the start, or the last change of what is walked."""
+        return self._begun * self.env.step_dt
+
     def set_command(self, command: Command) -> None:
-        """Ask all robots for something else, from the next step on."""
+        """Ask all robots for something else, from the next step on; figures begin anew."""
+        if command != self._command:
+            self._begin_anew()
         self._command = command
         self._ask()
 
@@ -77,13 +84,17 @@ class Session:
             self.set_command(Command(0.0, 0.0, 0.0, now.beta))
 
     def drive_with(self, controller: Controller) -> None:
-        """Let something else drive from the next step on, without a past; robots go on as they are.
+        """Let something else drive from the next step on, without a past; figures begin anew.
+
+        The robots go on as they are.
 
         Args:
             controller: Drives as many robots.
         """
         controller.reset()
         self.controller = controller
+        self._begin_anew()
+        self._obedience = Obedience(self.env)
 
     def push(self, forward: float, left: float) -> None:
         """Push all robots at once.
@@ -105,8 +116,7 @@ class Session:
         self.controller.reset()
         self.steps = 0
         """Control steps since the start."""
-        self._meter = GaitMeter(self.env, self._settle_time)
-        self._recent = GaitMeter(self.env, settle_time=0.0)
+        self._begin_figures()
         self._obedience = Obedience(self.env)
 
     def step(self) -> None:
@@ -126,18 +136,29 @@ class Session:
             self._ask()
 
     def gait(self) -> Gait:
-        """Return the figures since the start."""
+        """Return the figures since `figures_from`."""
         return self._meter.gait()
 
     def verdict(self) -> Verdict:
-        """Return how many robots did what they were asked since the start."""
+        """Return how many robots did what they were asked since the start, or the last driver's."""
         return self._obedience.verdict()
 
     def recent_gait(self) -> Gait:
-        """Return the figures since this was last asked."""
+        """Return the figures since this was last asked, or since `figures_from`."""
         gait = self._recent.gait()
         self._recent = GaitMeter(self.env, settle_time=0.0)
         return gait
+
+    def _begin_anew(self) -> None:
+        """Begin the figures anew, of robots that go on: none is of two commands or two drivers."""
+        if self.listener is not None:
+            self.listener.begin_anew()
+        self._begin_figures()
+
+    def _begin_figures(self) -> None:
+        self._begun = self.steps
+        self._meter = GaitMeter(self.env, self._settle_time)
+        self._recent = GaitMeter(self.env, settle_time=0.0)
 
     def _ask(self) -> None:
         """Give every robot the command, but for those that are to stand first."""

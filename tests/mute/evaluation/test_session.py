@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 import torch
 from standing import Standing
@@ -76,6 +78,37 @@ def test_what_drives_can_be_changed_while_it_walks():
     assert session.controller is other
     assert other.resets[0] is None  # it begins without a past
     assert session.steps == 2
+
+
+def _walk(session: Session, steps: int) -> None:
+    for _ in range(steps):
+        session.step()
+
+
+def test_figures_are_of_one_command_and_one_driver():
+    session = _make_session()
+    _walk(session, 20)
+    assert session.gait().velocity_error_sq == pytest.approx(0.25, abs=0.2)
+    session.set_command(Command(2.0, 0.0, 0.0, 0.5))
+    assert math.isnan(session.gait().speed)
+    _walk(session, 20)
+    assert session.gait().velocity_error_sq == pytest.approx(4.0, abs=0.3)
+    assert session.figures_from == pytest.approx(0.4)
+    session.set_command(Command(2.0, 0.0, 0.0, 0.5))  # the same: the figures go on
+    assert session.figures_from == pytest.approx(0.4)
+    session.drive_with(Standing(2))
+    assert math.isnan(session.gait().speed)
+    assert session.figures_from == pytest.approx(0.8)
+    session.restart()
+    assert session.figures_from == 0.0
+
+
+def test_another_driver_is_not_judged_by_what_the_one_before_did():
+    session = _make_session()
+    _walk(session, 130)
+    assert session.verdict().too_slow == 2
+    session.drive_with(Standing(2))
+    assert session.verdict().judged == 0
 
 
 def test_a_restart_forgets_figures_and_time_but_not_the_command():
