@@ -34,7 +34,8 @@ class Picture:
         """The model; its positions are those of the environment's."""
         self.data = mujoco.MjData(self.model)
         """Its state."""
-        self._boxes = [self.model.geom(GROUND_BOX.format(index)).id for index in range(count)]
+        self.ground_boxes = [self.model.geom(GROUND_BOX.format(index)).id for index in range(count)]
+        """Shapes of the model whose tops are the ground; none on a flat one."""
         self._laid: tuple[object, ...] = ()
 
     def show(self, robot: int) -> bool:
@@ -60,8 +61,8 @@ class Picture:
             return False
         self._laid = place
         laid, base = ground.drawn(robot, xy)
-        model, boxes = self.model, self._boxes[: laid.pos.shape[1]]
-        model.geom_pos[self._boxes, 2] = base - 100.0  # what another kind of ground left
+        model, boxes = self.model, self.ground_boxes[: laid.pos.shape[1]]
+        model.geom_pos[self.ground_boxes, 2] = base - 100.0  # what another kind of ground left
         model.geom_pos[model.geom("floor").id, 2] = base
         model.geom_pos[boxes] = laid.pos[0]
         model.geom_size[boxes] = laid.half[0]

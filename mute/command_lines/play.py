@@ -27,8 +27,15 @@ from mute.command_lines.arguments import (
     command_line,
     parse,
 )
-from mute.command_lines.play_choices import check_page, page_choices, with_all_sensors
-from mute.command_lines.play_figures import live_captions, report, summary
+from mute.command_lines.play_choices import with_all_sensors
+from mute.command_lines.play_figures import live_captions, report, stretch, summary
+from mute.command_lines.play_page import (
+    DEFAULT_HOST,
+    DEFAULT_PORT,
+    check_page,
+    check_place,
+    walk_in_page,
+)
 from mute.command_lines.policy_options import DriverArgs
 from mute.command_lines.sound_options import (
     MicrophonePlace,
@@ -114,12 +121,13 @@ class PlayArgs(DriverArgs):
     viewer: Literal["auto", "native", "web", "none"] = "auto"
     """native opens a window, auto does where there is a display; web serves a page to watch and
     steer in from any browser, until Ctrl-C or for --seconds; none does neither."""
-    host: str = "127.0.0.1"
+    host: str = DEFAULT_HOST
     """Address that the page of --viewer web listens at; 0.0.0.0 is seen from other machines."""
-    port: int = 8080
+    port: int = DEFAULT_PORT
     """Port of that page; where it is taken, the next free one."""
     policies: tuple[Path, ...] = ()
-    """Further policies that can be chosen in the page while it walks."""
+    """Further policies that can be chosen in the page while it walks: checkpoints, .onnx files, or
+    'latest'."""
     look: Look = "primitives"
     """The robot's look; menagerie needs the package mujoco_menagerie."""
     json: bool = False
@@ -151,9 +159,7 @@ class PlayArgs(DriverArgs):
             raise MuteError("--video films without a window, so not with --viewer native")
         if self.video and self.viewer == "web":
             raise MuteError("--video films as fast as it can, so not with --viewer web")
-        check_option("port", self.port, Range(1, 65535, whole=True))
-        if self.policies and self.viewer != "web":
-            raise MuteError("--policies are for --viewer web alone")
+        check_place(self.viewer == "web", self.host, self.port, self.policies)
 
     @property
     def command(self) -> Command:
@@ -198,12 +204,15 @@ def _play(args: PlayArgs) -> tuple[Session, int]:
     in_page, in_window = args.viewer == "web", _wants_window(args)
     if in_page:
         check_page()
+    args = args.with_driver_found()
     endless = (in_page or in_window) and args.seconds is None
     session = _make_session(args, endless)
     status = 0
     try:
         if in_page:
-            _walk_in_page(args, session)
+            num_steps = None if args.seconds is None else _num_steps(args, session)
+            place, dots = (args.host, args.port), _height_dots(args, session)
+            walk_in_page(args, args.policies, place, session, num_steps, dots)
         elif in_window:
             _walk_in_window(args, session)
         elif args.video:
@@ -250,7 +259,7 @@ def _wants_window(args: PlayArgs) -> bool:
 
 
 def _make_session(args: PlayArgs, endless: bool) -> Session:
-    policy = args.with_driver_found().driver()
+    policy = args.driver()
     seconds = LONGEST_WALK if endless else args.seconds or _DEFAULT_SECONDS
     stand_time = min(_STAND_TIME, 0.25 * seconds) if args.begin == "standing" else 0.0
     settle_time = min(stand_time + _SETTLE_TIME, 0.5 * seconds)
@@ -279,7 +288,7 @@ def _make_env(args: PlayArgs, policy: Driver, seconds: float) -> QuadrupedEnv:
     cfg = dataclasses.replace(cfg, random_heading=False, scene=scene)
     if args.viewer == "web":
         cfg = with_all_sensors(cfg)
-    if args.floor or not args.json:
+    if args.floor or args.viewer == "web" or not args.json:
         try:
             cfg = audible_cfg(cfg, args.floor)
         except ValueError as error:
@@ -321,24 +330,6 @@ def _walk_in_window(args: PlayArgs, session: Session) -> None:
     num_steps = None if args.seconds is None else _num_steps(args, session)
     with session.listener or contextlib.nullcontext():
         watch(session, num_steps, shown, _height_dots(args, session))
-
-
-def _walk_in_page(args: PlayArgs, session: Session) -> None:
-    """Serve a page to watch and steer in, until the time is over or an interrupt comes."""
-    from mute.live.page import page_server, show_page  # viser takes a second
-
-    num_steps = None if args.seconds is None else _num_steps(args, session)
-    choices = page_choices(args, args.policies, session)
-    with session.listener or contextlib.nullcontext(), page_server(args.host, args.port) as server:
-        print(f"watch and steer at http://{args.host}:{server.get_port()}", flush=True)
-        show_page(
-            server,
-            session,
-            num_steps,
-            lambda: live_captions(session),
-            choices,
-            _height_dots(args, session),
-        )
 
 
 def _height_dots(args: PlayArgs, session: Session) -> HeightDots | None:
@@ -396,6 +387,6 @@ def _print_header(args: PlayArgs, policy: Driver) -> None:
 
 def _print_summary(session: Session, floor: str | None) -> None:
     robots = session.env.num_envs
-    print(f"\nover {session.seconds:.1f} s, {robots} robot{'s' * (robots > 1)}:")
+    print(f"\n{stretch(session)}, {robots} robot{'s' * (robots > 1)}:")
     for name, text in summary(session, floor).items():
         print(f"  {name:20}{text}")

@@ -3,32 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mute.command_lines.policy_options import DriverArgs
-from mute.controllers import Controller, load_policy
-from mute.controllers.driver import Driver
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.evaluation.session import Session
 from mute.support.errors import MuteError
 
-__all__ = ["check_page", "misfit", "page_choices", "with_all_sensors"]
+if TYPE_CHECKING:
+    from mute.live.panel import Choice  # loads viser
 
-
-def check_page() -> None:
-    """Check that what serves the page is installed.
-
-    Raises:
-        MuteError: If it is not.
-    """
-    missing = [name for name in ("viser", "mjviser") if importlib.util.find_spec(name) is None]
-    if missing:
-        raise MuteError(
-            f"--viewer web needs {' and '.join(missing)}: pip install 'mute[web]', or in a "
-            "checkout pip install -e '.[web]'"
-        )
+__all__ = ["misfit", "page_choices", "with_all_sensors"]
 
 
 def with_all_sensors(cfg: QuadrupedEnvCfg) -> QuadrupedEnvCfg:
@@ -37,25 +24,34 @@ def with_all_sensors(cfg: QuadrupedEnvCfg) -> QuadrupedEnvCfg:
     return dataclasses.replace(cfg, observations=observations)
 
 
-def page_choices(
-    args: DriverArgs, policies: Sequence[Path], session: Session
-) -> dict[str, Callable[[], Controller]]:
-    """Return what makes each controller that can be chosen, by name: what walks comes first.
+def page_choices(args: DriverArgs, policies: Iterable[Path], session: Session) -> dict[str, Choice]:
+    """Return what can drive a walk, by name: what does at first, and what else was named.
+
+    The policy that ships and the model-predictive controller are among them where they fit.
 
     Args:
-        args: What walks.
-        policies: Further policies.
-        session: Whose robots are to be driven.
+        args: What drives at first, once it is found.
+        policies: Further policies: files, or `latest`.
+        session: The walk.
+
+    Raises:
+        MuteError: If one of `policies` cannot be used, or was made for other robots.
     """
-    first = session.controller
-    own = args.policy.stem if args.controller == "policy" else args.controller
-    choices: dict[str, Callable[[], Controller]] = {own: lambda: first}
+    from mute.live.panel import Choice
+
+    there = session.env.cfg
+    choices = {_name(args): Choice(session.controller, args.driver().quiet_factor)}
     for path in policies:
-        name = path.stem if path.stem not in choices else str(path)
-        choices[name] = lambda path=path: _fitting(load_policy(path), session)
-    if args.controller == "policy":
-        mpc = DriverArgs(controller="mpc")
-        choices["mpc"] = lambda: _fitting(mpc.driver(), session)
+        other = DriverArgs(policy=path, log_dir=args.log_dir).with_driver_found()
+        driver = other.driver()
+        reason = misfit(driver.cfg.env, there)
+        if reason is not None:
+            raise MuteError(f"--policies {other.policy} cannot drive this robot: {reason}")
+        choices[_unused(other, choices)] = Choice(driver.controller(there), driver.quiet_factor)
+    for other in (DriverArgs(), DriverArgs(controller="mpc")):
+        driver = other.driver()
+        if other.driver_name != args.driver_name and misfit(driver.cfg.env, there) is None:
+            choices[_unused(other, choices)] = Choice(driver.controller(there), driver.quiet_factor)
     return choices
 
 
@@ -82,13 +78,12 @@ def misfit(wanted: QuadrupedEnvCfg, there: QuadrupedEnvCfg) -> str | None:
     return None
 
 
-def _fitting(driver: Driver, session: Session) -> Controller:
-    """Return a controller of the session's robots.
+def _name(args: DriverArgs) -> str:
+    return args.policy.name if args.controller == "policy" else args.controller
 
-    Raises:
-        MuteError: If it was made for others.
-    """
-    reason = misfit(driver.cfg.env, session.env.cfg)
-    if reason is not None:
-        raise MuteError(reason)
-    return driver.controller(session.env.cfg)
+
+def _unused(args: DriverArgs, taken: Iterable[str]) -> str:
+    """Return a name for what drives: short, or with the directory where that is taken."""
+    names = [_name(args), args.driver_name]
+    names += [f"{args.driver_name} ({count})" for count in range(2, 3 + len(set(taken)))]
+    return next(name for name in names if name not in taken)

@@ -3,36 +3,97 @@
 from __future__ import annotations
 
 import dataclasses
-import subprocess
-import sys
+import shutil
+from pathlib import Path
 
 import pytest
 from dreamwaq_helpers import write_dreamwaq_policy
-from places import REPOSITORY
+from places import RESOURCES, SHIPPED_POLICY
 
-from mute.command_lines import play, play_choices
-from mute.command_lines.play_choices import misfit
+pytest.importorskip("viser", reason="needs mute[web]")
+
+from mute.command_lines.play_choices import misfit, page_choices, with_all_sensors
+from mute.command_lines.policy_options import DriverArgs
+from mute.controllers.command import Command
 from mute.controllers.learned import LearnedController
 from mute.controllers.mpc.controller import MpcController
+from mute.controllers.onnx_policy import OnnxController
+from mute.envs.quadruped_env import QuadrupedEnv
+from mute.evaluation.session import Session
+from mute.evaluation.trials import evaluation_cfg
+from mute.live.panel import Choice
 from mute.support.errors import MuteError
 from mute.tasks import make_task
 
+SHIPPED_ONNX = RESOURCES / "go1" / "go1_mute.onnx"
 
-def test_policies_and_the_planner_can_be_chosen_by_name(tmp_path):
+
+def _make_session(args: DriverArgs) -> Session:
+    driver = args.driver()
+    cfg = with_all_sensors(evaluation_cfg(driver.cfg.env, 1, seconds=5.0, seed=0))
+    env = QuadrupedEnv(dataclasses.replace(cfg, num_threads=1))
+    return Session(env, driver.controller(env.cfg), Command())
+
+
+def _choices(*policies: Path, **args: object) -> dict[str, Choice]:
+    found = DriverArgs(**args).with_driver_found()  # pyright: ignore[reportArgumentType]
+    return page_choices(found, policies, _make_session(found))
+
+
+def test_policies_exports_and_the_planner_can_drive_one_after_the_other(tmp_path):
     dreamwaq = write_dreamwaq_policy(tmp_path / "dreamwaq.pt")
-    args = play.PlayArgs(viewer="web", policies=(dreamwaq,))
-    session = play._make_session(args, endless=False)
-    choices = play_choices.page_choices(args, args.policies, session)
-    assert list(choices) == ["go1_mute", "dreamwaq", "mpc"]
-    assert choices["go1_mute"]() is session.controller
-    for name, kind in (("dreamwaq", LearnedController), ("mpc", MpcController)):
-        controller = choices[name]()
-        assert isinstance(controller, kind)
-        session.drive_with(controller)
+    args = DriverArgs().with_driver_found()
+    session = _make_session(args)
+    choices = page_choices(args, (dreamwaq, SHIPPED_ONNX), session)
+    kinds = {
+        "go1_mute.pt": (LearnedController, True),
+        "dreamwaq.pt": (LearnedController, False),
+        "go1_mute.onnx": (OnnxController, True),
+        "mpc": (MpcController, False),
+    }
+    assert list(choices) == list(kinds)
+    assert choices["go1_mute.pt"].controller is session.controller
+    for name, (kind, quiet_factor) in kinds.items():
+        assert isinstance(choices[name].controller, kind)
+        assert choices[name].quiet_factor is quiet_factor
+        session.drive_with(choices[name].controller)
         session.step()
 
 
-def test_a_policy_of_other_robots_is_refused_by_what_differs():
+def test_beside_the_planner_the_policy_that_ships_can_be_chosen():
+    assert list(_choices(controller="mpc")) == ["mpc", "go1_mute.pt"]
+
+
+def test_names_stay_apart_whatever_files_are_called(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "other").mkdir()
+    for name in ("mpc", "go1_mute.pt", "other/go1_mute.pt"):
+        shutil.copy(SHIPPED_POLICY, tmp_path / name)
+    policies = [Path(name) for name in ("mpc", "go1_mute.pt", "other/go1_mute.pt", "mpc")]
+    names = list(_choices(*policies))
+    assert names[:3] == ["go1_mute.pt", "mpc", "go1_mute.pt (2)"]
+    assert names[3] == "other/go1_mute.pt"
+    assert names[4:] == ["mpc (2)", "mpc (3)"]
+
+
+def test_latest_is_the_newest_checkpoint_by_its_name(tmp_path):
+    run = tmp_path / "runs" / "go1_mute" / "first"
+    run.mkdir(parents=True)
+    shutil.copy(SHIPPED_POLICY, run / "model_7.pt")
+    assert "model_7.pt" in _choices(Path("latest"), log_dir=tmp_path / "runs")
+    first = next(iter(_choices(policy=Path("latest"), log_dir=tmp_path / "runs")))
+    assert first == "model_7.pt"
+
+
+def test_a_policy_that_is_missing_or_of_other_robots_is_refused_before_the_walk(monkeypatch):
+    with pytest.raises(MuteError, match=r"no\.pt"):
+        _choices(Path("no.pt"))
+    monkeypatch.setattr("mute.command_lines.play_choices.misfit", lambda *_: "it differs")
+    with pytest.raises(MuteError, match=r"--policies .*\.onnx cannot drive this robot: it differs"):
+        _choices(SHIPPED_ONNX)
+
+
+def test_a_policy_of_other_robots_is_told_by_what_differs():
     ours = make_task("go1_mute").env
     assert misfit(make_task("go1_dreamwaq").env, ours) is None
     stiff = dataclasses.replace(ours, scene=dataclasses.replace(ours.scene, stiffness=28.0))
@@ -46,32 +107,3 @@ def test_a_policy_of_other_robots_is_refused_by_what_differs():
     assert misfit(fine, ours) is None
     slow = dataclasses.replace(ours, decimation=8)
     assert "a control step (s) 0.04" in str(misfit(slow, ours))
-
-
-def test_without_what_serves_it_the_page_is_refused_in_one_line(monkeypatch):
-    monkeypatch.setattr(play_choices.importlib.util, "find_spec", lambda _: None)
-    with pytest.raises(MuteError, match=r"--viewer web needs viser and mjviser: pip install"):
-        play_choices.check_page()
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--policies", "a.pt"], "--policies are for --viewer web alone"),
-        (["--viewer", "web", "--port", "0"], "--port must be"),
-        (["--viewer", "web", "--video", "a.mp4"], "not with --viewer web"),
-    ],
-)
-def test_bad_options_are_named(options, message):
-    with pytest.raises(MuteError, match=message):
-        play.main(options)
-
-
-def test_the_page_really_runs_and_ends_cleanly():
-    command = [sys.executable, "play.py", "--viewer", "web", "--port", "18100", "--seconds", "1.5"]
-    done = subprocess.run(
-        command, cwd=REPOSITORY, capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert "watch and steer at http://127.0.0.1:181" in done.stdout
-    assert "did as asked" in done.stdout
