@@ -197,7 +197,7 @@ def test_a_bad_beta_is_one_line_and_status_2():
         (("--video", "walk.mp4", "--viewer", "native"), "not with --viewer native"),
         (("--beta", "soft"), "--beta.*'soft'; see --help"),
         (("--bta", "1"), "Unrecognized options: --bta"),
-        (("--viewer", "web"), "invalid choice 'web' for argument '--viewer'"),
+        (("--viewer", "tv"), "invalid choice 'tv' for argument '--viewer'"),
     ],
 )
 def test_a_bad_argument_is_told_with_its_name_and_value(words, message, capsys):
