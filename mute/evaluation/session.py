@@ -6,6 +6,10 @@ are `mute.evaluation`'s.
 
 from __future__ import annotations
 
+from typing import Protocol
+
+import torch
+
 from mute.acoustics.live_listener import LiveListener
 from mute.controllers import Controller
 from mute.controllers.command import Command
@@ -14,7 +18,17 @@ from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.gait import Gait, GaitMeter
 from mute.evaluation.obedience import Obedience, Verdict
 
-__all__ = ["Session"]
+__all__ = ["Follower", "Session"]
+
+
+class Follower(Protocol):
+    """Follows a walk, beside the listener."""
+
+    def follow(self) -> None:
+        """Take in the control step that was just made."""
+
+    def restart(self) -> None:
+        """Take note that all robots are about to begin anew."""
 
 
 class Session:
@@ -43,6 +57,8 @@ class Session:
         self.env = env
         self.controller = controller
         self.listener = listener
+        self.followers: list[Follower] = []
+        """Further ones who are told of every step, in the order in which they came."""
         self._command = command
         self._going = command
         self._settle_time = settle_time
@@ -74,10 +90,32 @@ class Session:
             self._going = now
             self.set_command(Command(0.0, 0.0, 0.0, now.beta))
 
+    def drive_with(self, controller: Controller) -> None:
+        """Let something else drive from the next step on, without a past; robots go on as they are.
+
+        Args:
+            controller: Drives as many robots.
+        """
+        controller.reset()
+        self.controller = controller
+
+    def push(self, forward: float, left: float) -> None:
+        """Push all robots at once.
+
+        Args:
+            forward: Change of the trunk's velocity along its heading, m/s.
+            left: The same to its left, m/s.
+        """
+        ahead = self.env.heading
+        across = torch.stack((-ahead[:, 1], ahead[:, 0]), dim=1)
+        self.env.simulation.qvel[:, :2] += forward * ahead + left * across
+
     def restart(self) -> None:
         """Begin anew: robots, figures and time."""
         if self.listener is not None:
             self.listener.restart()
+        for follower in self.followers:
+            follower.restart()
         self.env.reset()
         self._ask()
         self.controller.reset()
@@ -97,6 +135,8 @@ class Session:
         self.steps += 1
         if self.listener is not None:
             self.listener.listen()
+        for follower in self.followers:
+            follower.follow()
         for meter in (self._meter, self._recent, self._obedience):
             meter.update(command, dones)
         if bool(dones.any()):

@@ -53,6 +53,56 @@ def test_a_robot_that_falls_goes_on_with_the_same_command_and_no_past():
     assert session.gait().fall_rate == 0.5
 
 
+def test_a_push_changes_the_velocity_along_the_heading_and_to_its_left():
+    session = _make_session()
+    env = session.env
+    before = env.simulation.qvel[:, :2].clone()
+    session.push(0.3, -0.4)
+    change = (env.simulation.qvel[:, :2] - before).float()
+    ahead = env.heading
+    across = torch.stack((-ahead[:, 1], ahead[:, 0]), dim=1)
+    close = torch.testing.assert_close
+    close((change * ahead).sum(dim=1), torch.full((2,), 0.3))
+    close((change * across).sum(dim=1), torch.full((2,), -0.4))
+    assert (ahead - torch.tensor([1.0, 0.0])).abs().max() > 0.1  # not the world's axes
+
+
+def test_what_drives_can_be_changed_while_it_walks():
+    session = _make_session()
+    session.step()
+    other = Standing(2)
+    session.drive_with(other)
+    session.step()
+    assert session.controller is other
+    assert other.resets[0] is None  # it begins without a past
+    assert session.steps == 2
+
+
+class _Follower:
+    """Notes what it is told, and how old the first robot is then, in control steps."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self.told: list[tuple[str, int]] = []
+
+    def follow(self) -> None:
+        self.told.append(("step", int(self._session.env.episode_length_buf[0])))
+
+    def restart(self) -> None:
+        self.told.append(("restart", int(self._session.env.episode_length_buf[0])))
+
+
+def test_who_follows_a_walk_is_told_of_each_step_and_of_a_restart_before_it():
+    session = _make_session()
+    follower = _Follower(session)
+    session.followers.append(follower)
+    session.step()
+    session.step()
+    session.restart()
+    session.step()
+    assert follower.told == [("step", 1), ("step", 2), ("restart", 2), ("step", 1)]
+
+
 def test_a_restart_forgets_figures_and_time_but_not_the_command():
     session = _make_session()
     session.set_command(Command(0.1, 0.2, 0.3, 0.4))
