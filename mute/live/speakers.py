@@ -37,7 +37,7 @@ _DEVICE_LATENCY = 0.03
 """Time for which a device is asked to hold samples, s. With less, Python could be late."""
 
 _LONGEST_END = 0.3
-"""Time that a device is given to ask for what waits at the end, s: one that is gone asks no more."""
+"""Time that a device is given to take what waits at the end, s: one that is gone takes nothing."""
 
 _INSTALL_PORTAUDIO = "on Debian: apt install libportaudio2"
 

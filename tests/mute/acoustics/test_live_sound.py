@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 import torch
@@ -11,6 +9,7 @@ from numpy.typing import NDArray
 
 from mute.acoustics.audible_env import audible_cfg
 from mute.acoustics.files.reading import read_wav
+from mute.acoustics.floors import FLOORS
 from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
 from mute.acoustics.live_listener import LiveListener
 from mute.acoustics.live_sound import LiveSound
@@ -18,6 +17,9 @@ from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
 from mute.acoustics.metering.third_octaves import ThirdOctaveMeter
 from mute.acoustics.recorder import Recorder
 from mute.acoustics.soundscape import Soundscape
+from mute.acoustics.sources.halves import halves
+from mute.acoustics.sources.response import floor_response
+from mute.acoustics.sources.shell import shell_response
 from mute.controllers import load_policy
 from mute.controllers.command import Command
 from mute.envs.quadruped_env import QuadrupedEnv
@@ -114,27 +116,15 @@ def test_once_it_is_closed_nothing_is_recorded_for_it():
         sound.follow()
 
 
-class _Timed:
-    """Follows a walk for another, and keeps the longest time that this took the thread, s."""
-
-    def __init__(self, sound: LiveSound) -> None:
-        self._sound = sound
-        self.longest = 0.0
-
-    def follow(self) -> None:
-        start = time.thread_time()
-        self._sound.follow()
-        self.longest = max(self.longest, time.thread_time() - start)
-
-    def restart(self) -> None:
-        self._sound.restart()
-
-
 def test_the_first_landings_of_a_walk_wait_for_no_filter():
-    session = _make_session("laminate")
-    # At a rate that nobody has heard before in this process.
-    timed = _Timed(LiveSound(session.env, "laminate", lambda _: None, 44000))
-    session.followers.append(timed)
+    surface, rate = "laminate", 44000  # a rate that nobody has heard before in this process
+    session = _make_session(surface)
+    plates = floor_response(FLOORS[surface].plate, rate), shell_response(rate)
+    both = [half for plate in plates for half in halves(plate, rate)]
+    assert not any(half.made for half in both)
+    session.followers.append(LiveSound(session.env, surface, lambda _: None, rate))
+    made = [half.made for half in both]
+    assert all(made)
     for _ in range(75):
         session.step()
-    assert 0.0 < timed.longest < 0.06
+    assert [half.made for half in both] == made
