@@ -6,6 +6,8 @@ are `mute.evaluation`'s.
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import torch
 
 from mute.acoustics.live_listener import LiveListener
@@ -16,7 +18,17 @@ from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.gait import Gait, GaitMeter
 from mute.evaluation.obedience import Obedience, Verdict
 
-__all__ = ["Session"]
+__all__ = ["Follower", "Session"]
+
+
+class Follower(Protocol):
+    """Follows a walk, beside the listener."""
+
+    def follow(self) -> None:
+        """Take in the control step that was just made."""
+
+    def restart(self) -> None:
+        """Take note that all robots are about to begin anew."""
 
 
 class Session:
@@ -45,6 +57,8 @@ class Session:
         self.env = env
         self.controller = controller
         self.listener = listener
+        self.followers: list[Follower] = []
+        """Further ones who are told of every step, in the order in which they came."""
         self._command = command
         self._going = command
         self._settle_time = settle_time
@@ -111,6 +125,8 @@ class Session:
         """Begin anew: robots, figures and time."""
         if self.listener is not None:
             self.listener.restart()
+        for follower in self.followers:
+            follower.restart()
         self.env.reset()
         self._ask()
         self.controller.reset()
@@ -129,6 +145,8 @@ class Session:
         self.steps += 1
         if self.listener is not None:
             self.listener.listen()
+        for follower in self.followers:
+            follower.follow()
         for meter in (self._meter, self._recent, self._obedience):
             meter.update(command, dones)
         if bool(dones.any()):

@@ -18,6 +18,7 @@ import mujoco.viewer
 
 from mute.envs.picture import Picture
 from mute.evaluation.session import Session
+from mute.live.gamepad import Gamepad
 from mute.live.keys import press
 from mute.live.pace import wait_until
 from mute.rendering.height_dots import HeightDots
@@ -34,6 +35,7 @@ def watch(
     num_steps: int | None,
     captions: Callable[[], dict[str, str]],
     dots: HeightDots | None = None,
+    gamepad: Gamepad | None = None,
 ) -> None:
     """Walk in a window until it is closed or the time is over.
 
@@ -42,6 +44,7 @@ def watch(
         num_steps: Control steps to walk; None for as long as the window is open.
         captions: Gives the figures to show in the window, by name; asked once a second.
         dots: Heights to draw as dots.
+        gamepad: Steers beside the keys.
 
     Raises:
         MuteError: If this Python cannot open windows (on macOS, that is mjpython's alone).
@@ -58,6 +61,8 @@ def watch(
         while viewer.is_running() and (num_steps is None or session.steps < num_steps):
             while not keys.empty():
                 press(session, keys.get())
+            if gamepad is not None:
+                gamepad.steer(session)
             session.step()
             with viewer.lock():
                 picture.show(0)

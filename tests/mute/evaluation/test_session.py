@@ -111,6 +111,31 @@ def test_another_driver_is_not_judged_by_what_the_one_before_did():
     assert session.verdict().judged == 0
 
 
+class _Follower:
+    """Notes what it is told, and how old the first robot is then, in control steps."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self.told: list[tuple[str, int]] = []
+
+    def follow(self) -> None:
+        self.told.append(("step", int(self._session.env.episode_length_buf[0])))
+
+    def restart(self) -> None:
+        self.told.append(("restart", int(self._session.env.episode_length_buf[0])))
+
+
+def test_who_follows_a_walk_is_told_of_each_step_and_of_a_restart_before_it():
+    session = _make_session()
+    follower = _Follower(session)
+    session.followers.append(follower)
+    session.step()
+    session.step()
+    session.restart()
+    session.step()
+    assert follower.told == [("step", 1), ("step", 2), ("restart", 2), ("step", 1)]
+
+
 def test_a_restart_forgets_figures_and_time_but_not_the_command():
     session = _make_session()
     session.set_command(Command(0.1, 0.2, 0.3, 0.4))
