@@ -26,7 +26,7 @@ def check_sound(in_real_time: bool) -> None:
     """
     if not in_real_time:
         raise MuteError(
-            "--sound plays a walk while it is watched, and no window opens here; there is --viewer web"
+            "--sound plays a walk while it is watched, and no window opens here; see --viewer web"
         )
     check_default_output()
 
