@@ -2,8 +2,9 @@
 
 The policy that ships walks on wood. The whole is what `evaluate.py noise` does. Of its parts are
 timed: to find landings and sliding in the physics, to make and measure the sound, and, for one
-robot, to have levels without sound. A walk of twice the length, in a process of its own as the
-first one, shows whether memory grows with it.
+robot, to have levels without sound, and to make its sound as it walks, a control step at a time.
+A walk of twice the length, in a process of its own as the first one, shows whether memory grows
+with it.
 """
 
 from __future__ import annotations
@@ -24,11 +25,12 @@ import numpy as np
 import torch
 from rich.progress import track
 
-from mute.acoustics.audible_env import make_listening_env
+from mute.acoustics.audible_env import TIMESTEP, make_listening_env
 from mute.acoustics.contacts import ContactBlock
 from mute.acoustics.energy import EnergyMeter
 from mute.acoustics.floors import FLOORS
 from mute.acoustics.listener import SAMPLE_RATE, SILENT_STRETCH, STRETCH
+from mute.acoustics.live_sound import warm_up
 from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
 from mute.acoustics.recorder import Recorder
 from mute.acoustics.soundscape import Soundscape
@@ -141,6 +143,10 @@ def measure(policy_file: str, trials: int, seconds: float, whole_alone: bool) ->
     finding, hearing, walking = _walk(policy, 1, simulated, SILENT_STRETCH, energies.update)
     parts += [part("lone recorder", 1, finding), part("lone energies", 1, hearing)]
     parts.append(part("lone walk", 1, walking))
+    warm_up(_FLOOR, SAMPLE_RATE, TIMESTEP)
+    live = Soundscape(1, [_FLOOR], sample_rate=SAMPLE_RATE, seed=_SEED)
+    finding, hearing, _ = _walk(policy, 1, simulated, policy.cfg.env.step_dt, live.render)
+    parts.append(part("lone live sound", 1, finding + hearing))
     return Times(parts, table, memory)
 
 

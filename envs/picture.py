@@ -34,29 +34,35 @@ class Picture:
         """The model; its positions are those of the environment's."""
         self.data = mujoco.MjData(self.model)
         """Its state."""
-        self._boxes = [self.model.geom(GROUND_BOX.format(index)).id for index in range(count)]
+        self.ground_boxes = [self.model.geom(GROUND_BOX.format(index)).id for index in range(count)]
+        """Shapes of the model whose tops are the ground; none on a flat one."""
         self._laid: tuple[object, ...] = ()
 
-    def show(self, robot: int) -> None:
-        """Take on the positions of one of the robots, and its ground."""
+    def show(self, robot: int) -> bool:
+        """Take on the positions of one of the robots, and its ground.
+
+        Returns:
+            Whether the ground lies otherwise than before.
+        """
         qpos = self._env.simulation.qpos[robot]
-        self._lay(robot, qpos[:2])
+        laid = self._lay(robot, qpos[:2])
         self.data.qpos[:] = qpos.numpy(force=True)
         mujoco.mj_forward(self.model, self.data)
+        return laid
 
-    def _lay(self, robot: int, xy: torch.Tensor) -> None:
-        """Lay what is seen of the ground, unless it lies there."""
+    def _lay(self, robot: int, xy: torch.Tensor) -> bool:
+        """Lay what is seen of the ground, unless it lies there; return whether it did not."""
         ground = self._env.ground
         if not isinstance(ground, BoxGround):
-            return
+            return False
         cell = torch.floor(xy / TREAD).tolist()
         place = (robot, int(ground.level[robot]), int(ground.key[robot]), *cell)
         if place == self._laid:
-            return
+            return False
         self._laid = place
         laid, base = ground.drawn(robot, xy)
-        model, boxes = self.model, self._boxes[: laid.pos.shape[1]]
-        model.geom_pos[self._boxes, 2] = base - 100.0  # what another kind of ground left
+        model, boxes = self.model, self.ground_boxes[: laid.pos.shape[1]]
+        model.geom_pos[self.ground_boxes, 2] = base - 100.0  # what another kind of ground left
         model.geom_pos[model.geom("floor").id, 2] = base
         model.geom_pos[boxes] = laid.pos[0]
         model.geom_size[boxes] = laid.half[0]
@@ -64,3 +70,4 @@ class Picture:
         model.geom_quat[boxes] = 0.0
         model.geom_quat[boxes, 0] = torch.cos(0.5 * laid.pitch[0])
         model.geom_quat[boxes, 2] = torch.sin(0.5 * laid.pitch[0])
+        return True

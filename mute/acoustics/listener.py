@@ -169,12 +169,15 @@ class Listener:
             self._energies if self._from_energies else SoundLevelMeter(SAMPLE_RATE, self._count)
         )
         self._steps = 0
-        self._age = np.zeros(self._count, dtype=np.int64)
-        self._kept_parts = [np.zeros((self._count, 0), dtype=bool)]
         self._chosen = 0
-        self._tally = Tally(self._count, list(self._energies.exposure))
         self._seconds = 0.0
         self._joint_work = np.zeros(self._count)
+        self._begin_figures()
+
+    def begin_anew(self) -> None:
+        """Begin the figures anew, of robots that go on: as after a fall, once they have settled."""
+        self._work()
+        self._begin_figures()
 
     def listen(self, dones: torch.Tensor) -> None:
         """Hear the control step that the environment has just made.
@@ -219,6 +222,12 @@ class Listener:
     def _kept(self) -> NDArray[np.bool_]:
         """Return which readings count. Shape: (robots, readings)."""
         return np.concatenate(self._kept_parts, axis=1)
+
+    def _begin_figures(self) -> None:
+        """Leave all that came so far out of the figures."""
+        self._age = np.zeros(self._count, dtype=np.int64)
+        self._kept_parts = [np.zeros((self._count, self._chosen), dtype=bool)]
+        self._tally = Tally(self._count, list(self._energies.exposure))
 
     def _work(self) -> None:
         """Measure, and write, what has been recorded since the last time."""

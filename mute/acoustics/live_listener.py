@@ -101,6 +101,10 @@ class LiveListener:
         """Measure anew, of a robot that is about to be reset; a sound that is kept goes on."""
         self._listener.restart()
 
+    def begin_anew(self) -> None:
+        """Begin `levels` anew, of a robot that goes on; `level` and a sound that is kept do too."""
+        self._listener.begin_anew()
+
     def listen(self) -> None:
         """Hear the control step that the environment has just made."""
         self._listener.listen(self._env.episode_length_buf == 0)
@@ -112,7 +116,8 @@ class LiveListener:
     def levels(self) -> dict[str, float]:
         """Return `mnl`, `pnl` and `laeq`, dBA; NaN where the time was too short.
 
-        They are of the time since the start, without the last stretch until it is left.
+        They are of the time since the start, or since they began anew, without the last stretch
+        until it is left.
         """
         levels = self._listener.levels()[0]
         return {"mnl": levels.mnl, "pnl": levels.pnl, "laeq": levels.laeq}

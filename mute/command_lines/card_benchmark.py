@@ -56,6 +56,7 @@ _PARTS_OF_SOUND = {
     "lone recorder": "one robot: finding landings and sliding",
     "lone energies": "one robot: levels without sound",
     "lone walk": "one robot: everything",
+    "lone live sound": "one robot: its sound as it walks",
 }
 
 _OF_A_WALK = {"minutes": ("minutes", "{:.2f}"), "iteration": ("iterations", "{}")}

@@ -27,7 +27,16 @@ from mute.command_lines.arguments import (
     command_line,
     parse,
 )
-from mute.command_lines.play_figures import live_captions, report, summary
+from mute.command_lines.play_choices import with_all_sensors
+from mute.command_lines.play_figures import live_captions, report, stretch, summary
+from mute.command_lines.play_page import (
+    DEFAULT_HOST,
+    DEFAULT_PORT,
+    check_page,
+    check_place,
+    walk_in_page,
+)
+from mute.command_lines.play_sound import check_sound, played_aloud
 from mute.command_lines.policy_options import DriverArgs
 from mute.command_lines.sound_options import (
     MicrophonePlace,
@@ -35,6 +44,7 @@ from mute.command_lines.sound_options import (
     check_sources,
     find_microphone,
     progress_bar,
+    tell,
 )
 from mute.controllers.command import COMMAND_LIMITS, Command
 from mute.controllers.driver import Driver
@@ -44,6 +54,8 @@ from mute.envs.terrain import KINDS, TerrainCfg
 from mute.envs.terrain.figures import LEVELS
 from mute.evaluation.session import Session
 from mute.evaluation.trials import evaluation_cfg, from_the_stance
+from mute.live.gamepad import GAMEPAD_HELP, Gamepad
+from mute.live.gamepad_process import gamepad_process
 from mute.live.keys import KEYS_HELP
 from mute.rendering.backend import has_display, why_no_window
 from mute.rendering.height_dots import HeightDots
@@ -70,7 +82,9 @@ Watch a policy walk, hear it, steer it, film it, or have its figures.
 
 Where there is a display, a window opens; else figures are printed as it walks.
 
-{KEYS_HELP}"""
+{KEYS_HELP}
+
+{GAMEPAD_HELP}"""
 
 
 @dataclass
@@ -103,15 +117,26 @@ class PlayArgs(DriverArgs):
     surface: str | None = None
     """Floor to walk on and to hear, with physics at 1 ms: wood, parquet, laminate, carpet,
     tile or concrete. Unless given, training's floor and physics, with a level (modelled, sounding
-    as wood); with --wav or --video, wood."""
+    as wood); with --sound, --wav or --video, wood."""
     sources: Sources = SOURCES
     microphone: MicrophonePlace = "trunk"
+    sound: bool = False
+    """Play the modelled sound of the first robot through this machine's loudspeakers while it walks
+    in a window or a page; needs sounddevice: pip install 'mute[sound]'."""
     wav: Path | None = None
     """Keep the modelled sound of the first robot in this .wav file."""
     video: Path | None = None
     """Film to this .mp4 file, with sound, without a window."""
-    viewer: Literal["auto", "native", "none"] = "auto"
-    """native opens a window, none does not, auto does where there is a display."""
+    viewer: Literal["auto", "native", "web", "none"] = "auto"
+    """native opens a window, auto does where there is a display; web serves a page to watch and
+    steer in from any browser, until Ctrl-C or for --seconds; none does neither."""
+    host: str = DEFAULT_HOST
+    """Address that the page of --viewer web listens at; 0.0.0.0 is seen from other machines."""
+    port: int = DEFAULT_PORT
+    """Port of that page; where it is taken, the next free one."""
+    policies: tuple[Path, ...] = ()
+    """Further policies that can be chosen in the page while it walks: checkpoints, .onnx files, or
+    'latest'."""
     look: Look = "primitives"
     """The robot's look; menagerie needs the package mujoco_menagerie."""
     json: bool = False
@@ -141,6 +166,13 @@ class PlayArgs(DriverArgs):
         find_microphone(self.microphone)
         if self.video and self.viewer == "native":
             raise MuteError("--video films without a window, so not with --viewer native")
+        if self.video and self.viewer == "web":
+            raise MuteError("--video films as fast as it can, so not with --viewer web")
+        check_place(self.viewer == "web", self.host, self.port, self.policies)
+        if self.sound and (self.video or self.viewer == "none"):
+            raise MuteError(
+                "--sound plays a walk that is watched, so not with --video or --viewer none"
+            )
 
     @property
     def command(self) -> Command:
@@ -150,10 +182,10 @@ class PlayArgs(DriverArgs):
     @property
     def floor(self) -> str | None:
         """Name of the floor to walk on; None for training's."""
-        return self.surface or (_SURFACE if self.wav or self.video else None)
+        return self.surface or (_SURFACE if self.sound or self.sound_file else None)
 
     @property
-    def sound(self) -> Path | None:
+    def sound_file(self) -> Path | None:
         """File for the sound; that of a video alone is beside it, until it is put in."""
         if self.wav or not self.video:
             return self.wav
@@ -182,11 +214,22 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _play(args: PlayArgs) -> tuple[Session, int]:
     """Walk as asked and return the walk and the exit status."""
     use_collection_threads()
-    in_window = _wants_window(args)
-    session = _make_session(args, endless=in_window and args.seconds is None)
+    in_page, in_window = args.viewer == "web", _wants_window(args)
+    if in_page:
+        check_page()
+    if args.sound:
+        check_sound(in_page or in_window)
+    args = args.with_driver_found()
+    endless = (in_page or in_window) and args.seconds is None
+    session = _make_session(args, endless)
     status = 0
     try:
-        if in_window:
+        if in_page:
+            num_steps = None if args.seconds is None else _num_steps(args, session)
+            place, dots = (args.host, args.port), _height_dots(args, session)
+            with _aloud(args, session):
+                walk_in_page(args, args.policies, place, session, num_steps, dots)
+        elif in_window:
             _walk_in_window(args, session)
         elif args.video:
             _walk_on_video(args, session, args.video)
@@ -219,7 +262,7 @@ def _wants_window(args: PlayArgs) -> bool:
     Raises:
         MuteError: If one is asked for and none can open.
     """
-    if args.viewer == "none" or args.video:
+    if args.viewer in ("none", "web") or args.video:
         return False
     reason = why_no_window(os.environ, sys.platform)
     if reason is None:
@@ -232,7 +275,7 @@ def _wants_window(args: PlayArgs) -> bool:
 
 
 def _make_session(args: PlayArgs, endless: bool) -> Session:
-    policy = args.with_driver_found().driver()
+    policy = args.driver()
     seconds = LONGEST_WALK if endless else args.seconds or _DEFAULT_SECONDS
     stand_time = min(_STAND_TIME, 0.25 * seconds) if args.begin == "standing" else 0.0
     settle_time = min(stand_time + _SETTLE_TIME, 0.5 * seconds)
@@ -259,7 +302,9 @@ def _make_env(args: PlayArgs, policy: Driver, seconds: float) -> QuadrupedEnv:
     # All walk along x, so that the camera has the same view of every walk.
     scene = dataclasses.replace(cfg.scene, look=args.look)
     cfg = dataclasses.replace(cfg, random_heading=False, scene=scene)
-    if args.floor or not args.json:
+    if args.viewer == "web":
+        cfg = with_all_sensors(cfg)
+    if args.floor or args.viewer == "web" or not args.json:
         try:
             cfg = audible_cfg(cfg, args.floor)
         except ValueError as error:
@@ -276,7 +321,7 @@ def _make_listener(args: PlayArgs, env: QuadrupedEnv, settle_time: float) -> Liv
         surface,
         settle_time,
         args.seed,
-        args.sound,
+        args.sound_file,
         find_microphone(args.microphone),
         args.sources,
     )
@@ -297,10 +342,19 @@ def _walk_in_window(args: PlayArgs, session: Session) -> None:
             **live_captions(session),
         }
 
-    print(KEYS_HELP, flush=True)
+    print(KEYS_HELP, GAMEPAD_HELP, sep="\n", flush=True)
     num_steps = None if args.seconds is None else _num_steps(args, session)
-    with session.listener or contextlib.nullcontext():
-        watch(session, num_steps, shown, _height_dots(args, session))
+    heard = session.listener or contextlib.nullcontext()
+    with heard, _aloud(args, session), gamepad_process() as pad:
+        watch(session, num_steps, shown, _height_dots(args, session), Gamepad(pad, tell))
+
+
+def _aloud(args: PlayArgs, session: Session) -> contextlib.AbstractContextManager[None]:
+    """Return what plays the walk through the loudspeakers, where that is asked for."""
+    if not args.sound:
+        return contextlib.nullcontext()
+    microphone = find_microphone(args.microphone)
+    return played_aloud(session, args.floor or _SURFACE, args.seed, microphone, args.sources)
 
 
 def _height_dots(args: PlayArgs, session: Session) -> HeightDots | None:
@@ -309,7 +363,7 @@ def _height_dots(args: PlayArgs, session: Session) -> HeightDots | None:
 
 
 def _walk_on_video(args: PlayArgs, session: Session, path: Path) -> None:
-    video = Video(path, session.env, args.sound, dots=_height_dots(args, session))
+    video = Video(path, session.env, args.sound_file, dots=_height_dots(args, session))
     try:
         with video:
             _walk_in_text(args, session, video.record)
@@ -319,8 +373,8 @@ def _walk_on_video(args: PlayArgs, session: Session, path: Path) -> None:
     finally:
         if video.silent_because:
             print(f"{path} is without sound: {video.silent_because}", file=sys.stderr)
-        if args.sound and not args.wav:
-            args.sound.unlink(missing_ok=True)
+        if args.sound_file and not args.wav:
+            args.sound_file.unlink(missing_ok=True)
     print(f"video: {path} ({video.frame_rate:.0f} pictures a second)", file=sys.stderr)
 
 
@@ -358,6 +412,6 @@ def _print_header(args: PlayArgs, policy: Driver) -> None:
 
 def _print_summary(session: Session, floor: str | None) -> None:
     robots = session.env.num_envs
-    print(f"\nover {session.seconds:.1f} s, {robots} robot{'s' * (robots > 1)}:")
+    print(f"\n{stretch(session)}, {robots} robot{'s' * (robots > 1)}:")
     for name, text in summary(session, floor).items():
         print(f"  {name:20}{text}")

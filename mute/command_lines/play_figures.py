@@ -9,7 +9,7 @@ from mute.evaluation.gait import Gait
 from mute.evaluation.obedience import Verdict
 from mute.evaluation.session import Session
 
-__all__ = ["captions", "live_captions", "report", "summary"]
+__all__ = ["captions", "live_captions", "page_captions", "report", "stretch", "summary"]
 
 _REPORTED = (
     "speed",
@@ -38,6 +38,7 @@ def report(session: Session) -> dict[str, Any]:
         "command": [command.vx, command.vy, command.wz],
         "num_envs": session.env.num_envs,
         "seconds": round(session.seconds, 6),
+        "figures_from": round(session.figures_from, 6),
         **({"surface": listener.surface} if listener else {}),
         **{name: value if math.isfinite(value) else None for name, value in figures.items()},
     }
@@ -68,8 +69,29 @@ def live_captions(session: Session) -> dict[str, str]:
     return figures
 
 
+def page_captions(session: Session) -> dict[str, str]:
+    """Return what a page shows: `live_captions`, and the levels and mishaps since figures began."""
+    figures, gait = live_captions(session), session.gait()
+    if session.listener is not None:
+        levels = session.listener.levels()
+        for name in ("mnl", "pnl"):
+            figures[name.upper()] = _or_dash(f"{levels[name]:.1f} dBA")
+    figures["figures of"] = f"{session.seconds - session.figures_from:.0f} s with this command"
+    if gait.fall_rate > 0.0:
+        figures["fell"] = f"{100.0 * gait.fall_rate:.0f} % of the robots"
+    return figures | _mishaps(gait)
+
+
+def stretch(session: Session) -> str:
+    """Return in words the time that the figures are of."""
+    if session.figures_from == 0.0:
+        return f"over {session.seconds:.1f} s"
+    last = session.seconds - session.figures_from
+    return f"over the last {last:.1f} of {session.seconds:.1f} s, since what is walked changed"
+
+
 def summary(session: Session, floor: str | None) -> dict[str, str]:
-    """Return the figures of the whole walk, by name.
+    """Return the figures of the walk, of the time that `stretch` tells, by name.
 
     Args:
         session: The walk.
@@ -83,10 +105,7 @@ def summary(session: Session, floor: str | None) -> dict[str, str]:
         "fell": f"{100.0 * gait.fall_rate:.1f} % of the robots",
     }
     figures["did as asked"] = _told(session.verdict(), session.env.num_envs)
-    if gait.unstable > 0:
-        figures["unstable"] = f"{gait.unstable} times, and reset: the simulation blew up"
-    if gait.invalid_actions > 0:
-        figures["invalid actions"] = f"{gait.invalid_actions}, with NaN or infinity"
+    figures |= _mishaps(gait)
     if session.listener is not None:
         levels = session.listener.levels()
         about = ["modelled", f"on {floor}" if floor else f"sounding as {session.listener.surface}"]
@@ -94,6 +113,16 @@ def summary(session: Session, floor: str | None) -> dict[str, str]:
         for name in ("mnl", "pnl"):
             figures[f"level, {name.upper()}"] = f"{levels[name]:.1f} dBA ({', '.join(about)})"
     return {name: _or_dash(text) for name, text in figures.items()}
+
+
+def _mishaps(gait: Gait) -> dict[str, str]:
+    """Return what went wrong beside falls, by name."""
+    figures = {}
+    if gait.unstable > 0:
+        figures["unstable"] = f"{gait.unstable} times, and reset: the simulation blew up"
+    if gait.invalid_actions > 0:
+        figures["invalid actions"] = f"{gait.invalid_actions}, with NaN or infinity"
+    return figures
 
 
 def _told(verdict: Verdict, robots: int) -> str:

@@ -17,6 +17,7 @@ from mute.controllers import load_policy
 from mute.controllers.driver import Driver
 from mute.controllers.mpc.driver import MpcDriver
 from mute.controllers.mpc.settings import MpcCfg
+from mute.controllers.onnx_policy import load_onnx_policy
 from mute.support.errors import MuteError
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK, make_task
@@ -33,7 +34,7 @@ class PolicyArgs:
 
     policy: Path = _SHIPPED
     """Policy to use: a checkpoint, or 'latest' for the newest one under --log-dir; by default the
-    one that ships."""
+    one that ships. Where robots walk, an exported .onnx file will do."""
     task: str | None = None
     """Task of the policy: of the one that ships, go1_mute unless given, or of the latest, any
     unless given. A checkpoint that is named must be of it. `module:task` imports a module of yours
@@ -109,7 +110,11 @@ class DriverArgs(PolicyArgs):
         Raises:
             MuteError: If it cannot be used.
         """
-        return load_policy(self.policy) if self.controller == "policy" else self._mpc()
+        if self.controller != "policy":
+            return self._mpc()
+        if self.policy.suffix == ".onnx":
+            return load_onnx_policy(self.policy)
+        return load_policy(self.policy)
 
     def audible_driver(self) -> Driver:
         """Return what drives the robots, which can be heard, once it is found.

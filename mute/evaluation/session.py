@@ -6,6 +6,10 @@ are `mute.evaluation`'s.
 
 from __future__ import annotations
 
+from typing import Protocol
+
+import torch
+
 from mute.acoustics.live_listener import LiveListener
 from mute.controllers import Controller
 from mute.controllers.command import Command
@@ -14,7 +18,17 @@ from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.gait import Gait, GaitMeter
 from mute.evaluation.obedience import Obedience, Verdict
 
-__all__ = ["Session"]
+__all__ = ["Follower", "Session"]
+
+
+class Follower(Protocol):
+    """Follows a walk, beside the listener."""
+
+    def follow(self) -> None:
+        """Take in the control step that was just made."""
+
+    def restart(self) -> None:
+        """Take note that all robots are about to begin anew."""
 
 
 class Session:
@@ -43,6 +57,8 @@ class Session:
         self.env = env
         self.controller = controller
         self.listener = listener
+        self.followers: list[Follower] = []
+        """Further ones who are told of every step, in the order in which they came."""
         self._command = command
         self._going = command
         self._settle_time = settle_time
@@ -59,8 +75,15 @@ class Session:
         """Time walked since the start, s."""
         return self.steps * self.env.step_dt
 
+    @property
+    def figures_from(self) -> float:
+        """Time at which the figures began, s: the start, or the last change of what is walked."""
+        return self._begun * self.env.step_dt
+
     def set_command(self, command: Command) -> None:
-        """Ask all robots for something else, from the next step on."""
+        """Ask all robots for something else, from the next step on; figures begin anew."""
+        if command != self._command:
+            self._begin_anew()
         self._command = command
         self._ask()
 
@@ -74,17 +97,42 @@ class Session:
             self._going = now
             self.set_command(Command(0.0, 0.0, 0.0, now.beta))
 
+    def drive_with(self, controller: Controller) -> None:
+        """Let something else drive from the next step on, without a past; figures begin anew.
+
+        The robots go on as they are.
+
+        Args:
+            controller: Drives as many robots.
+        """
+        controller.reset()
+        self.controller = controller
+        self._begin_anew()
+        self._obedience = Obedience(self.env)
+
+    def push(self, forward: float, left: float) -> None:
+        """Push all robots at once.
+
+        Args:
+            forward: Change of the trunk's velocity along its heading, m/s.
+            left: The same to its left, m/s.
+        """
+        ahead = self.env.heading
+        across = torch.stack((-ahead[:, 1], ahead[:, 0]), dim=1)
+        self.env.simulation.qvel[:, :2] += forward * ahead + left * across
+
     def restart(self) -> None:
         """Begin anew: robots, figures and time."""
         if self.listener is not None:
             self.listener.restart()
+        for follower in self.followers:
+            follower.restart()
         self.env.reset()
         self._ask()
         self.controller.reset()
         self.steps = 0
         """Control steps since the start."""
-        self._meter = GaitMeter(self.env, self._settle_time)
-        self._recent = GaitMeter(self.env, settle_time=0.0)
+        self._begin_figures()
         self._obedience = Obedience(self.env)
 
     def step(self) -> None:
@@ -97,6 +145,8 @@ class Session:
         self.steps += 1
         if self.listener is not None:
             self.listener.listen()
+        for follower in self.followers:
+            follower.follow()
         for meter in (self._meter, self._recent, self._obedience):
             meter.update(command, dones)
         if bool(dones.any()):
@@ -104,18 +154,29 @@ class Session:
             self._ask()
 
     def gait(self) -> Gait:
-        """Return the figures since the start."""
+        """Return the figures since `figures_from`."""
         return self._meter.gait()
 
     def verdict(self) -> Verdict:
-        """Return how many robots did what they were asked since the start."""
+        """Return how many robots did what they were asked since the start, or the last driver's."""
         return self._obedience.verdict()
 
     def recent_gait(self) -> Gait:
-        """Return the figures since this was last asked."""
+        """Return the figures since this was last asked, or since `figures_from`."""
         gait = self._recent.gait()
         self._recent = GaitMeter(self.env, settle_time=0.0)
         return gait
+
+    def _begin_anew(self) -> None:
+        """Begin the figures anew, of robots that go on: none is of two commands or two drivers."""
+        if self.listener is not None:
+            self.listener.begin_anew()
+        self._begin_figures()
+
+    def _begin_figures(self) -> None:
+        self._begun = self.steps
+        self._meter = GaitMeter(self.env, self._settle_time)
+        self._recent = GaitMeter(self.env, settle_time=0.0)
 
     def _ask(self) -> None:
         """Give every robot the command, but for those that are to stand first."""

@@ -18,14 +18,13 @@ import mujoco.viewer
 
 from mute.envs.picture import Picture
 from mute.evaluation.session import Session
+from mute.live.gamepad import Gamepad
 from mute.live.keys import press
+from mute.live.pace import wait_until
 from mute.rendering.height_dots import HeightDots
 from mute.support.errors import MuteError
 
 __all__ = ["watch"]
-
-_MAX_LAG = 0.1
-"""Lag behind real time from which on it is given up to catch up, s."""
 
 _CLOSING_TIME = 5.0
 """Longest time that a window may take to close, s."""
@@ -36,6 +35,7 @@ def watch(
     num_steps: int | None,
     captions: Callable[[], dict[str, str]],
     dots: HeightDots | None = None,
+    gamepad: Gamepad | None = None,
 ) -> None:
     """Walk in a window until it is closed or the time is over.
 
@@ -44,6 +44,7 @@ def watch(
         num_steps: Control steps to walk; None for as long as the window is open.
         captions: Gives the figures to show in the window, by name; asked once a second.
         dots: Heights to draw as dots.
+        gamepad: Steers beside the keys.
 
     Raises:
         MuteError: If this Python cannot open windows (on macOS, that is mjpython's alone).
@@ -60,6 +61,8 @@ def watch(
         while viewer.is_running() and (num_steps is None or session.steps < num_steps):
             while not keys.empty():
                 press(session, keys.get())
+            if gamepad is not None:
+                gamepad.steer(session)
             session.step()
             with viewer.lock():
                 picture.show(0)
@@ -70,7 +73,7 @@ def watch(
                 shown = captions()
                 viewer.set_texts((None, None, "\n".join(shown), "\n".join(shown.values())))
             viewer.sync()
-            due = _wait(due + env.step_dt)
+            due = wait_until(due + env.step_dt)
 
 
 @contextlib.contextmanager
@@ -93,12 +96,3 @@ def _open(
         # The thread that draws still cleans up; the process must not end under it.
         for thread in threads:
             thread.join(_CLOSING_TIME)
-
-
-def _wait(due: float) -> float:
-    """Sleep until a time and return it, or the present where it is too far in the past."""
-    now = time.perf_counter()
-    if now < due:
-        time.sleep(due - now)
-        return due
-    return due if now - due < _MAX_LAG else now

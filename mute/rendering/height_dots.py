@@ -29,7 +29,9 @@ class HeightDots:
             controller: What drives it; one that estimates no heights has no orange dots.
             robot: Its index.
         """
-        self._env, self._controller, self._robot = env, controller, robot
+        self._env, self._robot = env, robot
+        self.controller = controller
+        """What drives it."""
 
     def add_to(self, scene: mujoco.MjvScene) -> None:
         """Add the dots to what is to be drawn, as far as the scene has room."""
@@ -47,12 +49,21 @@ class HeightDots:
                 )
                 scene.ngeom += 1
 
+    def points(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+        """Return the places of all dots in the world, m, and their colours, from 0 to 1.
+
+        Shapes: (dots, 3) each.
+        """
+        places, colours = zip(*self._dots(), strict=True)
+        counts = [len(each) for each in places]
+        return np.concatenate(places), np.repeat(np.stack(colours)[:, :3], counts, axis=0)
+
     def _dots(self) -> list[tuple[NDArray[np.float64], NDArray[np.float32]]]:
         """Return the places of the dots, and their colours."""
         env, robot = self._env, self._robot
         true = env.ground.height_map(env.grid, env.base_pos, env.heading)[robot]
         dots = [(self._places(true), _TRUE)]
-        estimate = getattr(self._controller, "estimate", None)
+        estimate = getattr(self.controller, "estimate", None)
         if estimate is not None and estimate.heights.shape[1]:
             dots.append((self._places(estimate.heights[robot]), _ESTIMATED))
         return dots

@@ -76,6 +76,11 @@ class Half:
         self._response = response
         self._filters: dict[int, tuple[int, NDArray, NDArray | None]] = {}
 
+    @property
+    def made(self) -> set[int]:
+        """Samples of the forces that it is ready for; others take a while at first."""
+        return set(self._filters)
+
     def heard(
         self, force: NDArray, distance: NDArray, place: NDArray, size: NDArray
     ) -> NDArray[np.floating]:

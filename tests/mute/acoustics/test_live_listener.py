@@ -113,6 +113,36 @@ def test_a_restart_forgets_the_levels_and_not_the_sound(tmp_path):
     assert read_wav(path)[0].shape == (1, 120 * SAMPLE_RATE // 50)
 
 
+def test_figures_of_another_driver_hold_nothing_of_the_one_before_while_the_meter_goes_on(tmp_path):
+    path = tmp_path / "walk.wav"
+    session, listener = _make_session("tile", 2.0, path)
+    with listener:
+        _walk(session, 60)
+        loud, now = listener.levels(), listener.level()
+        session.drive_with(_Stamp(1, lift=0.0))
+        assert listener.level() == now
+        assert all(math.isnan(level) for level in listener.levels().values())
+        _walk(session, 10)
+        assert math.isnan(listener.levels()["mnl"])  # what was before still rings in the meter
+        _walk(session, 65)
+    assert loud["mnl"] > FAN_LEVEL + 6.0
+    for level in listener.levels().values():
+        assert level == pytest.approx(FAN_LEVEL, abs=1.0)
+    assert read_wav(path)[0].shape == (1, 135 * SAMPLE_RATE // 50)
+
+
+def test_figures_that_begin_anew_before_a_first_step_are_those_of_the_walk():
+    levels = []
+    for begins_anew in (False, True):
+        session, listener = _make_session("tile", 2.0)
+        with listener:
+            if begins_anew:
+                listener.begin_anew()
+            _walk(session, 60)
+        levels.append(listener.levels())
+    assert levels[0] == levels[1]
+
+
 def test_a_robot_that_falls_is_in_the_levels_only_once_it_has_settled_again():
     session, listener = _make_session("tile")
     with listener:

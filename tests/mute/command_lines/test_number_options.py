@@ -122,6 +122,6 @@ def test_every_command_is_walked():
 
 def test_the_commands_have_as_many_options_with_numbers_as_they_seem_to():
     counts = {command: len(list(_numbers(command))) for command in _COMMANDS}
-    assert counts["play"] == 8
+    assert counts["play"] == 9
     assert counts["evaluate sweep-speed"] == 5
     assert counts["benchmark"] == 7

@@ -23,7 +23,7 @@ from mute.acoustics.listener import SAMPLE_RATE, WAV_FULL_SCALE
 from mute.acoustics.metering.sound_level_meter import SoundLevelMeter
 from mute.checkpoint import save_checkpoint
 from mute.command_lines.play import PlayArgs, main
-from mute.command_lines.play_figures import captions, report, summary
+from mute.command_lines.play_figures import captions, page_captions, report, stretch, summary
 from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
 from mute.controllers.command import Command
 from mute.envs.quadruped_env import QuadrupedEnv
@@ -38,7 +38,7 @@ from mute.support.errors import MuteError
 REPORTED = {
     "beta", "command", "num_envs", "seconds", "speed", "velocity_error_sq", "landing_speed_mean",
     "landing_speed_rms", "apex_mean", "duty_factor", "stride_frequency", "power", "fall_rate",
-    "unstable", "invalid_actions", "did_as_asked",
+    "unstable", "invalid_actions", "did_as_asked", "figures_from",
 }  # fmt: skip
 HEADLESS = {
     key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")
@@ -197,7 +197,7 @@ def test_a_bad_beta_is_one_line_and_status_2():
         (("--video", "walk.mp4", "--viewer", "native"), "not with --viewer native"),
         (("--beta", "soft"), "--beta.*'soft'; see --help"),
         (("--bta", "1"), "Unrecognized options: --bta"),
-        (("--viewer", "web"), "invalid choice 'web' for argument '--viewer'"),
+        (("--viewer", "tv"), "invalid choice 'tv' for argument '--viewer'"),
     ],
 )
 def test_a_bad_argument_is_told_with_its_name_and_value(words, message, capsys):
@@ -356,6 +356,31 @@ def test_what_went_wrong_is_told_and_is_no_fall(tmp_path, monkeypatch):
     shown = summary(session, None)
     assert shown["unstable"].startswith("1 times")
     assert shown["invalid actions"].startswith("6, ")
+
+
+def test_the_time_that_figures_are_of_is_told():
+    session = _make_session()
+    for _ in range(10):
+        session.step()
+    assert stretch(session) == "over 0.2 s"
+    assert report(session)["figures_from"] == 0.0
+    session.set_command(Command(0.5, 0.0, 0.0, 1.0))
+    for _ in range(15):
+        session.step()
+    assert stretch(session) == "over the last 0.3 of 0.5 s, since what is walked changed"
+    assert report(session)["figures_from"] == 0.2
+
+
+def test_a_page_shows_what_a_line_does_and_the_mishaps():
+    session = _make_session()
+    for _ in range(20):
+        session.step()
+    shown = page_captions(session)
+    assert shown["speed"].endswith("m/s")
+    assert not {"fell", "unstable"} & set(shown)
+    session.env.simulation.qpos[1, 3:7] = torch.tensor((0.0, 1.0, 0.0, 0.0))
+    session.step()
+    assert page_captions(session)["fell"] == "50 % of the robots"
 
 
 def test_what_was_not_measured_is_null_in_the_report_and_a_dash_on_the_screen():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 import torch
 from standing import Standing
@@ -51,6 +53,87 @@ def test_a_robot_that_falls_goes_on_with_the_same_command_and_no_past():
     assert forgotten is not None
     assert forgotten.tolist() == [False, True]
     assert session.gait().fall_rate == 0.5
+
+
+def test_a_push_changes_the_velocity_along_the_heading_and_to_its_left():
+    session = _make_session()
+    env = session.env
+    before = env.simulation.qvel[:, :2].clone()
+    session.push(0.3, -0.4)
+    change = (env.simulation.qvel[:, :2] - before).float()
+    ahead = env.heading
+    across = torch.stack((-ahead[:, 1], ahead[:, 0]), dim=1)
+    close = torch.testing.assert_close
+    close((change * ahead).sum(dim=1), torch.full((2,), 0.3))
+    close((change * across).sum(dim=1), torch.full((2,), -0.4))
+    assert (ahead - torch.tensor([1.0, 0.0])).abs().max() > 0.1  # not the world's axes
+
+
+def test_what_drives_can_be_changed_while_it_walks():
+    session = _make_session()
+    session.step()
+    other = Standing(2)
+    session.drive_with(other)
+    session.step()
+    assert session.controller is other
+    assert other.resets[0] is None  # it begins without a past
+    assert session.steps == 2
+
+
+def _walk(session: Session, steps: int) -> None:
+    for _ in range(steps):
+        session.step()
+
+
+def test_figures_are_of_one_command_and_one_driver():
+    session = _make_session()
+    _walk(session, 20)
+    assert session.gait().velocity_error_sq == pytest.approx(0.25, abs=0.2)
+    session.set_command(Command(2.0, 0.0, 0.0, 0.5))
+    assert math.isnan(session.gait().speed)
+    _walk(session, 20)
+    assert session.gait().velocity_error_sq == pytest.approx(4.0, abs=0.3)
+    assert session.figures_from == pytest.approx(0.4)
+    session.set_command(Command(2.0, 0.0, 0.0, 0.5))  # the same: the figures go on
+    assert session.figures_from == pytest.approx(0.4)
+    session.drive_with(Standing(2))
+    assert math.isnan(session.gait().speed)
+    assert session.figures_from == pytest.approx(0.8)
+    session.restart()
+    assert session.figures_from == 0.0
+
+
+def test_another_driver_is_not_judged_by_what_the_one_before_did():
+    session = _make_session()
+    _walk(session, 130)
+    assert session.verdict().too_slow == 2
+    session.drive_with(Standing(2))
+    assert session.verdict().judged == 0
+
+
+class _Follower:
+    """Notes what it is told, and how old the first robot is then, in control steps."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self.told: list[tuple[str, int]] = []
+
+    def follow(self) -> None:
+        self.told.append(("step", int(self._session.env.episode_length_buf[0])))
+
+    def restart(self) -> None:
+        self.told.append(("restart", int(self._session.env.episode_length_buf[0])))
+
+
+def test_who_follows_a_walk_is_told_of_each_step_and_of_a_restart_before_it():
+    session = _make_session()
+    follower = _Follower(session)
+    session.followers.append(follower)
+    session.step()
+    session.step()
+    session.restart()
+    session.step()
+    assert follower.told == [("step", 1), ("step", 2), ("restart", 2), ("step", 1)]
 
 
 def test_a_restart_forgets_figures_and_time_but_not_the_command():
