@@ -51,7 +51,7 @@ async function pressPad(page: Page, index: number): Promise<void> {
   }, index);
 }
 
-test("a gamepad's sticks drive and turn, its buttons stop, push and begin anew", async () => {
+test("a gamepad's sticks drive and turn, its buttons stop, push, hush and begin anew", async () => {
   const opened = await site.visit({ before: plugPad });
   const { page } = opened;
   await plug(page, true);
@@ -76,6 +76,11 @@ test("a gamepad's sticks drive and turn, its buttons stop, push and begin anew",
   assert.equal((await stateOf(page)).command.vx, 0.4);
   await pressPad(page, 2);
   assert.match(await opened.note(), /Pushed to the left/);
+  const { beta } = (await stateOf(page)).command;
+  await pressPad(page, 4);
+  assert.ok(Math.abs((await stateOf(page)).command.beta - (beta - 0.1)) < 1e-9);
+  await pressPad(page, 5);
+  assert.ok(Math.abs((await stateOf(page)).command.beta - beta) < 1e-9);
   await pressPad(page, 9);
   assert.match(await opened.note(), /starts again/);
   await leave(opened);

@@ -1,10 +1,12 @@
-/** A gamepad: its left stick drives, its right one turns, buttons push, stop and begin again. */
+/** A gamepad: its left stick drives, its right one turns, buttons do the rest, as in `play.py`. */
 
+import type { Axis } from "../physics/page_data.js";
 import { withoutSlack } from "./joystick.js";
 
 /** What a gamepad asks for; shares from -1 to 1. */
 export interface PadActions {
   drive(forward: number, left: number, turn: number): void;
+  change(axis: Axis, step: number): void;
   stopOrGo(): void;
   push(): void;
   restart(): void;
@@ -16,7 +18,11 @@ export interface PadActions {
 /** Buttons of the standard layout. */
 const STOP = 0;
 const PUSH = 2;
+const LESS_QUIET = 4;
+const QUIETER = 5;
 const RESTART = 9;
+
+const BETA_STEP = 0.1;
 
 export class GamepadInput {
   private pressed = new Set<number>();
@@ -35,10 +41,16 @@ export class GamepadInput {
     const pad = navigator.getGamepads?.().find((found) => found?.connected);
     if (!pad) return;
     this.readSticks(pad);
-    const actions = { [STOP]: "stopOrGo", [PUSH]: "push", [RESTART]: "restart" } as const;
-    for (const [index, action] of Object.entries(actions)) {
-      if (this.isNewlyPressed(pad, Number(index))) this.actions[action]();
+    for (const index of [STOP, PUSH, LESS_QUIET, QUIETER, RESTART]) {
+      if (this.isNewlyPressed(pad, index)) this.press(index);
     }
+  }
+
+  private press(button: number): void {
+    if (button === STOP) this.actions.stopOrGo();
+    else if (button === PUSH) this.actions.push();
+    else if (button === RESTART) this.actions.restart();
+    else this.actions.change("beta", button === QUIETER ? BETA_STEP : -BETA_STEP);
   }
 
   private readSticks(pad: Gamepad): void {
