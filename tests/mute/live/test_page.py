@@ -181,6 +181,7 @@ def test_the_ground_follows_the_robot_as_boxes_that_are_moved_not_made_anew(serv
     before = ground.batched_positions.copy()
     assert isinstance(session.env.ground, BoxGround)
     laid, _ = session.env.ground.drawn(0, session.env.simulation.qpos[0, :2])
+    assert ground.batched_scales is not None
     tops = before[: laid.pos.shape[1], 2] + ground.batched_scales[: laid.pos.shape[1], 2]
     torch.testing.assert_close(
         torch.tensor(tops), (laid.pos + laid.half)[0, :, 2].float(), atol=1e-5, rtol=0.0
