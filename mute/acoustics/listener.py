@@ -221,7 +221,9 @@ class Listener:
 
     def _kept(self) -> NDArray[np.bool_]:
         """Return which readings count. Shape: (robots, readings)."""
-        return np.concatenate(self._kept_parts, axis=1)
+        # Put together once: whoever asks each second for hours is not to wait longer each time.
+        self._kept_parts = [np.concatenate(self._kept_parts, axis=1)]
+        return self._kept_parts[0]
 
     def _begin_figures(self) -> None:
         """Leave all that came so far out of the figures."""

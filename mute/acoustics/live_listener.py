@@ -102,7 +102,7 @@ class LiveListener:
         self._listener.restart()
 
     def begin_anew(self) -> None:
-        """Begin `levels` anew, of a robot that goes on; `level` and a sound that is kept do too."""
+        """Begin `levels` anew, of a robot that goes on; `level` and a sound that is kept go on."""
         self._listener.begin_anew()
 
     def listen(self) -> None:

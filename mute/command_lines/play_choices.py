@@ -42,7 +42,8 @@ def page_choices(args: DriverArgs, policies: Iterable[Path], session: Session) -
     there = session.env.cfg
     choices = {_name(args): Choice(session.controller, args.driver().quiet_factor)}
     for path in policies:
-        other = DriverArgs(policy=path, log_dir=args.log_dir).with_driver_found()
+        task = args.task if str(path) == "latest" else None
+        other = DriverArgs(policy=path, task=task, log_dir=args.log_dir).with_driver_found()
         driver = other.driver()
         reason = misfit(driver.cfg.env, there)
         if reason is not None:

@@ -76,7 +76,7 @@ def page_captions(session: Session) -> dict[str, str]:
         levels = session.listener.levels()
         for name in ("mnl", "pnl"):
             figures[name.upper()] = _or_dash(f"{levels[name]:.1f} dBA")
-    figures["figures of"] = f"{session.seconds - session.figures_from:.0f} s with this command"
+    figures["MNL and PNL of"] = f"{session.seconds - session.figures_from:.0f} s"
     if gait.fall_rate > 0.0:
         figures["fell"] = f"{100.0 * gait.fall_rate:.0f} % of the robots"
     return figures | _mishaps(gait)
@@ -87,7 +87,7 @@ def stretch(session: Session) -> str:
     if session.figures_from == 0.0:
         return f"over {session.seconds:.1f} s"
     last = session.seconds - session.figures_from
-    return f"over the last {last:.1f} of {session.seconds:.1f} s, since what is walked changed"
+    return f"over the last {last:.1f} of {session.seconds:.1f} s, since another driver took over"
 
 
 def summary(session: Session, floor: str | None) -> dict[str, str]:

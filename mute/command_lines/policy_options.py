@@ -69,6 +69,10 @@ class PolicyArgs:
             return self.policy
         if self.policy == _SHIPPED:
             return _that_ships(self.task)
+        if self.policy.suffix == ".onnx":
+            raise MuteError(
+                f"--task goes with checkpoints, which tell theirs; {self.policy} is an export"
+            )
         task = load_checkpoint(self.policy).get("task")
         if task != self.task:
             raise CheckpointError(f"{self.policy} is of task {task!r}, not {self.task!r}")

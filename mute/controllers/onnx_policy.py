@@ -123,7 +123,7 @@ def load_onnx_policy(path: Path) -> OnnxPolicy:
         policy = OnnxPolicy(path.name, cfg, session, json.loads(metadata["recurrent_state"]))
     except KeyError as error:
         raise CheckpointError(f"{path} is no exported policy: it has no {error}") from error
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, AttributeError) as error:
         raise CheckpointError(f"{path} is no policy for this robot: {first_line(error)}") from error
     _check_graph(path, policy)
     return policy

@@ -77,13 +77,11 @@ class Session:
 
     @property
     def figures_from(self) -> float:
-        """Time at which the figures began, s: the start, or the last change of what is walked."""
+        """Time at which the figures began, s: the start, or the last change of what drives."""
         return self._begun * self.env.step_dt
 
     def set_command(self, command: Command) -> None:
-        """Ask all robots for something else, from the next step on; figures begin anew."""
-        if command != self._command:
-            self._begin_anew()
+        """Ask all robots for something else, from the next step on."""
         self._command = command
         self._ask()
 
@@ -168,7 +166,7 @@ class Session:
         return gait
 
     def _begin_anew(self) -> None:
-        """Begin the figures anew, of robots that go on: none is of two commands or two drivers."""
+        """Begin the figures anew, of robots that go on: none is of two drivers."""
         if self.listener is not None:
             self.listener.begin_anew()
         self._begin_figures()

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from mute.controllers.command import Command
 from mute.evaluation.session import Session
 
 __all__ = ["GAMEPAD_HELP", "Gamepad", "GamepadSource", "PadState", "Pull", "pull", "without_slack"]
@@ -110,6 +111,7 @@ class Gamepad:
         self._tell = tell
         self._state: PadState | None = None
         self._pull = Pull()
+        self._is_stopped = False
         self._pushes = 0
 
     def steer(self, session: Session) -> None:
@@ -121,7 +123,7 @@ class Gamepad:
                 self._lose(session)
             else:
                 self._follow(session, event)
-        if self._pull != Pull():
+        if self._pull != Pull() and not self._is_stopped:
             self._drive(session, self._pull)
 
     def _follow(self, session: Session, now: PadState) -> None:
@@ -130,7 +132,10 @@ class Gamepad:
         held = self._state.buttons if self._state is not None else frozenset()
         self._state = now
         before, self._pull = self._pull, pull(now.axes)
-        if self._pull != before:
+        if self._is_stopped:
+            # Sticks that were held when it was stopped drive again once they were let go.
+            self._is_stopped = self._pull != Pull()
+        elif self._pull != before:
             self._drive(session, self._pull)
         for button in sorted(now.buttons - held):
             self._press(session, button)
@@ -140,27 +145,25 @@ class Gamepad:
             return
         self._drive(session, Pull())
         self._tell(f"the gamepad {self._state.name} is gone: the robot stands; keys go on")
-        self._state, self._pull = None, Pull()
+        self._state, self._pull, self._is_stopped = None, Pull(), False
 
     @staticmethod
     def _drive(session: Session, asked: Pull) -> None:
         """Ask for shares of the speeds that are trained."""
         trained = session.env.cfg.commands
-        now = session.command
-        wanted = {
-            "vx": _part(asked.forward, trained.lin_vel_x),
-            "vy": _part(asked.left, trained.lin_vel_y),
-            "wz": _part(asked.turn, trained.ang_vel_z),
-        }
-        command = now.changed(
-            **{name: value - getattr(now, name) for name, value in wanted.items()}
+        command = Command(
+            vx=_part(asked.forward, trained.lin_vel_x),
+            vy=_part(asked.left, trained.lin_vel_y),
+            wz=_part(asked.turn, trained.ang_vel_z),
+            beta=session.command.beta,
         )
-        if command != now:
+        if command != session.command:
             session.set_command(command)
 
     def _press(self, session: Session, button: int) -> None:
         if button == _STOP:
             session.stop_or_go()
+            self._is_stopped = session.command.stands and self._pull != Pull()
         elif button == _PUSH:
             side = -1.0 if self._pushes % 2 else 1.0
             self._pushes += 1

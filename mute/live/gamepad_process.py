@@ -58,7 +58,10 @@ class GamepadProcess:
     def _listen(self) -> None:
         told = False
         for line in self._lines:
-            event = _event(json.loads(line))
+            try:
+                event = _event(json.loads(line))
+            except (ValueError, KeyError, TypeError):
+                continue  # a library may write there, too
             told = told or isinstance(event, str)
             self._events.put(event)
         if not self._is_leaving:

@@ -118,7 +118,7 @@ def main(
     try:
         mappings = os.environ.get(_MAPPINGS)
         if mappings:
-            glfw.update_gamepad_mappings(mappings.encode())
+            glfw.update_gamepad_mappings(os.fsencode(mappings))
         reader = Reader(glfw)
         while not ended.wait(_PERIOD):
             for what in reader.look():

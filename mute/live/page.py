@@ -46,10 +46,11 @@ def show_page(
     per_second = round(1.0 / step_dt)
     per_picture = max(1, round(1.0 / (_PICTURES_PER_SECOND * step_dt)))
     per_point = max(1, round(1.0 / (TRACE_RATE * step_dt)))
-    due = time.perf_counter()
-    while num_steps is None or session.steps < num_steps:
+    due, walked = time.perf_counter(), 0
+    while num_steps is None or walked < num_steps:
         panel.obey()
         session.step()
+        walked += 1
         if session.steps % per_picture == 0:
             scene.update()
         if session.steps % per_point == 0:

@@ -88,7 +88,8 @@ class Panel:
         self.figures = gui.add_markdown("")
         """Shows the figures."""
         self._trace: deque[tuple[float, float]] = deque(maxlen=round(_TRACE_SECONDS * TRACE_RATE))
-        self._plot = self._add_plot(gui) if session.listener is not None else None
+        self.plot = self._add_plot(gui) if session.listener is not None else None
+        """Shows the level's trace; None where nothing is heard."""
         self._tell_whether_beta_counts()
         self._connect()
 
@@ -104,14 +105,14 @@ class Panel:
     def trace(self) -> None:
         """Add the level of now to its trace."""
         listener = self._session.listener
-        if self._plot is None or listener is None:
+        if self.plot is None or listener is None:
             return
         level = listener.level()
         if math.isfinite(level):
             self._trace.append((self._session.seconds, level))
         if len(self._trace) > 1:
             seconds, levels = np.array(self._trace).T
-            self._plot.data = (seconds, levels)
+            self.plot.data = (seconds, levels)
 
     def _connect(self) -> None:
         for slider in self.sliders.values():
@@ -122,8 +123,19 @@ class Panel:
         self.choice.on_update(lambda _: self._asked.put(self._choose))
 
     def _steer(self) -> None:
-        """Ask for what the sliders say; several that moved at once are one new command."""
-        command = Command(**{name: float(slider.value) for name, slider in self.sliders.items()})
+        """Ask for what the sliders say; several that moved at once are one new command.
+
+        What comes from a browser may be anything: numbers that are none are left alone, and none
+        goes further than a slider.
+        """
+        command = Command(
+            **{
+                name: _asked(
+                    slider.value, getattr(self._session.command, name), COMMAND_LIMITS[name]
+                )
+                for name, slider in self.sliders.items()
+            }
+        )
         if command != self._session.command:
             self._session.set_command(command)
 
@@ -142,7 +154,7 @@ class Panel:
 
     def _choose(self) -> None:
         """Let something else drive, with no past; the robots go on as they stand."""
-        if self.choice.value != self._driver:
+        if self.choice.value != self._driver and self.choice.value in self._choices:
             self._driver = self.choice.value
             self._session.drive_with(self._choices[self._driver].controller)
             self._tell_whether_beta_counts()
@@ -168,3 +180,9 @@ class Panel:
             title="level (dBA, Fast), modelled",
             aspect=1.6,
         )
+
+
+def _asked(value: float, now: float, limits: tuple[float, float]) -> float:
+    """Return what a slider asks for, within its limits; what is now, where it is no number."""
+    value = float(value)
+    return min(max(value, limits[0]), limits[1]) if math.isfinite(value) else float(now)

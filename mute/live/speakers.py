@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import functools
 import importlib
 import os
 import sys
@@ -122,6 +123,8 @@ class Speakers:
     def summary(self) -> str:
         """Return in a line how the playing went."""
         queue = self._queue
+        if queue.mean_wait == 0.0:
+            return "nothing was heard"
         told = f"heard {1e3 * self.latency:.0f} ms after it was walked"
         if self.gaps:
             told += f", {self.gaps} gaps of {queue.silence:.2f} s in all"
@@ -176,7 +179,11 @@ def open_default_output(sample_rate: int, play: Play) -> Stream:
                 latency=_DEVICE_LATENCY,
                 callback=callback,
             )
-            stream.start()
+            try:
+                stream.start()
+            except BaseException:
+                stream.close()
+                raise
     return stream
 
 
@@ -231,16 +238,21 @@ _AlsaHandler = ctypes.CFUNCTYPE(
 )
 
 
-@_AlsaHandler
-def _say_nothing(*_: object) -> None:
-    """Take what ALSA would write to standard error, a line for each time that it is late."""
+@functools.cache
+def _silence() -> Any:  # noqa: ANN401
+    """Return what takes all that ALSA would write, a line for each time that it is late.
+
+    Made once, and only where it is needed: ALSA keeps it for good, and some machines let no program
+    make functions as it runs.
+    """
+    return _AlsaHandler(lambda *_: None)
 
 
 @contextlib.contextmanager
 def _quiet_libraries() -> Iterator[None]:
     """Keep what sound libraries write to standard error, lines of each device that is not there."""
-    with contextlib.suppress(OSError, AttributeError):  # on Linux alone, and for good
-        ctypes.CDLL("libasound.so.2").snd_lib_error_set_handler(_say_nothing)
+    with contextlib.suppress(OSError, AttributeError, MemoryError):  # on Linux alone, and for good
+        ctypes.CDLL("libasound.so.2").snd_lib_error_set_handler(_silence())
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:

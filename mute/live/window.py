@@ -53,17 +53,18 @@ def watch(
     picture = Picture(env)
     picture.show(0)
     per_second = round(1.0 / env.step_dt)
-    due = time.perf_counter()
+    due, walked = time.perf_counter(), 0
     with _open(picture.model, picture.data, keys.put) as viewer:
         viewer.cam.type = mujoco.mjtCamera.mjCAMERA_TRACKING
         viewer.cam.trackbodyid = picture.model.body("trunk").id
         viewer.cam.azimuth, viewer.cam.elevation, viewer.cam.distance = 125.0, -14.0, 1.5
-        while viewer.is_running() and (num_steps is None or session.steps < num_steps):
+        while viewer.is_running() and (num_steps is None or walked < num_steps):
             while not keys.empty():
                 press(session, keys.get())
             if gamepad is not None:
                 gamepad.steer(session)
             session.step()
+            walked += 1
             with viewer.lock():
                 picture.show(0)
                 if dots is not None:

@@ -196,7 +196,9 @@ class LevelDetector:
     def readings(self) -> NDArray[np.float64]:
         """Levels read at `reading_times`, dB. Shape: (channels, readings)."""
         none_yet = np.zeros((self.channels, 0))
-        return self._decibels(np.concatenate([none_yet, *self._readings], axis=1))
+        # Put together once: whoever asks each second for hours is not to wait longer each time.
+        self._readings = [np.concatenate([none_yet, *self._readings], axis=1)]
+        return self._decibels(self._readings[0])
 
     @property
     def reading_times(self) -> NDArray[np.float64]:

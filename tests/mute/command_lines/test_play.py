@@ -364,10 +364,10 @@ def test_the_time_that_figures_are_of_is_told():
         session.step()
     assert stretch(session) == "over 0.2 s"
     assert report(session)["figures_from"] == 0.0
-    session.set_command(Command(0.5, 0.0, 0.0, 1.0))
+    session.drive_with(session.controller)
     for _ in range(15):
         session.step()
-    assert stretch(session) == "over the last 0.3 of 0.5 s, since what is walked changed"
+    assert stretch(session) == "over the last 0.3 of 0.5 s, since another driver took over"
     assert report(session)["figures_from"] == 0.2
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import signal
 import socket
 import subprocess
 import sys
+import time
 import urllib.request
 from pathlib import Path
 
@@ -52,7 +55,8 @@ def test_a_place_where_it_cannot_listen_ends_it_in_one_line():
     pytest.importorskip("viser", reason="needs mute[web]")
     done = _run("--host", "192.0.2.1", "--seconds", "1")
     assert done.returncode == 2
-    reason = "no page at --host '192.0.2.1' --port 8080: Cannot assign requested address"
+    why = os.strerror(errno.EADDRNOTAVAIL)
+    reason = f"no page at --host '192.0.2.1' --port 8080: {why}"
     assert reason in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr
 
@@ -101,6 +105,7 @@ def test_an_interrupt_ends_it_with_its_one_object_and_the_status_of_a_signal(tmp
 def _address(path: Path, running: subprocess.Popen[str]) -> str:
     """Wait until the address is told, and return it; the time limit of tests bounds it."""
     while running.poll() is None:
+        time.sleep(0.05)
         for line in path.read_text().splitlines():
             if line.startswith("watch and steer at "):
                 return line.removeprefix("watch and steer at ")

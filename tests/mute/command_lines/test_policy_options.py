@@ -110,3 +110,10 @@ def test_the_policy_that_is_measured_is_the_one_that_is_named_whatever_is_saved_
     assert args.driver().iteration == 10
     assert args.origin()["policy"].endswith("model_10.pt")
     assert args.driver_name.endswith("model_10.pt")
+
+
+def test_an_export_that_is_asked_for_a_task_is_not_taken_for_a_damaged_checkpoint():
+    with pytest.raises(
+        MuteError, match=r"--task goes with checkpoints.* policy\.onnx is an export"
+    ):
+        DriverArgs(policy=Path("policy.onnx"), task="go1_mute").with_driver_found()

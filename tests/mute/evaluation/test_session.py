@@ -85,17 +85,14 @@ def _walk(session: Session, steps: int) -> None:
         session.step()
 
 
-def test_figures_are_of_one_command_and_one_driver():
+def test_figures_are_of_all_commands_and_of_one_driver():
     session = _make_session()
     _walk(session, 20)
     assert session.gait().velocity_error_sq == pytest.approx(0.25, abs=0.2)
     session.set_command(Command(2.0, 0.0, 0.0, 0.5))
-    assert math.isnan(session.gait().speed)
     _walk(session, 20)
-    assert session.gait().velocity_error_sq == pytest.approx(4.0, abs=0.3)
-    assert session.figures_from == pytest.approx(0.4)
-    session.set_command(Command(2.0, 0.0, 0.0, 0.5))  # the same: the figures go on
-    assert session.figures_from == pytest.approx(0.4)
+    assert 1.0 < session.gait().velocity_error_sq < 3.5
+    assert session.figures_from == 0.0
     session.drive_with(Standing(2))
     assert math.isnan(session.gait().speed)
     assert session.figures_from == pytest.approx(0.8)

@@ -134,6 +134,24 @@ def test_a_button_counts_when_it_is_pressed_and_not_while_it_is_held(driven):
     assert driven.ask(_state(), _state(0, 0, 0, A)) == going
 
 
+def test_a_stop_holds_until_the_sticks_were_let_go(driven):
+    pulled = driven.ask(_state(y=-1.0))
+    assert driven.ask(_state(0, -1.0, 0, A)).stands
+    assert driven.ask(_state(y=-0.8)).stands
+    assert driven.ask().stands
+    assert driven.ask(_state()).stands
+    assert driven.ask(_state(y=-1.0)) == pulled
+
+
+def test_to_go_on_leaves_a_held_stick_in_charge(driven):
+    driven.ask(_state(), _state(0, 0, 0, A))
+    pulled = driven.ask(_state(y=-1.0))
+    driven.ask(_state(0, -1.0, 0, A), _state(y=-1.0))
+    assert driven.ask(_state(0, -1.0, 0, A)).vx > 0.0
+    assert driven.ask(_state(y=-1.0)).stands is False
+    assert pulled.vx > 0.0
+
+
 def test_bumpers_change_beta_within_its_limits(driven):
     assert driven.ask(_state(0, 0, 0, RB)).beta == 0.6
     assert driven.ask(_state(), _state(0, 0, 0, LB)).beta == 0.5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import pytest
@@ -9,7 +10,10 @@ import torch
 from standing import Standing
 
 pytest.importorskip("viser", reason="needs mute[web]")
+pytest.importorskip("mjviser", reason="needs mute[web]")
 
+import mjviser
+import mujoco
 import viser
 
 from mute.acoustics.audible_env import audible_cfg
@@ -115,6 +119,24 @@ def test_start_again_begins_anew_and_what_drives_forgets(server):
     assert controller.resets == [None]
 
 
+@pytest.mark.parametrize(("sent", "asked"), [(math.nan, 0.5), (math.inf, 0.5), (1e9, 2.0)])
+def test_what_no_slider_can_say_is_not_asked_for(server, sent, asked):
+    session = _make_session()
+    panel = _make_panel(server, session)
+    panel.sliders["vx"].value = sent
+    panel.obey()
+    assert session.command.vx == asked
+
+
+def test_a_driver_that_is_not_there_is_not_chosen(server):
+    session = _make_session()
+    before = session.controller
+    panel = _make_panel(server, session)
+    panel.choice.value = "nobody"
+    panel.obey()
+    assert session.controller is before
+
+
 def test_what_drives_is_chosen_without_a_past_and_has_figures_of_its_own(server):
     session, other = _make_session(), Standing(1)
     first = session.controller
@@ -164,6 +186,39 @@ def test_a_walk_in_a_page_goes_on_to_its_end(server, terrain):
     show_page(server, session, 60, captions, {"standing": Choice(session.controller)}, dots)
     assert session.steps == 60
     assert len(shown) == 1
+
+
+def test_a_page_shows_the_figures_and_the_trace_of_the_level(server):
+    session = _make_session(heard=True)
+    panel = _make_panel(server, session)
+    panel.show({"speed": "0.5 m/s", "strides": "2"})
+    assert panel.figures.content == "- speed: **0.5 m/s**\n- strides: **2**"
+    assert session.listener is not None
+    assert panel.plot is not None
+    with session.listener:
+        for _ in range(25):
+            session.step()
+            panel.trace()
+    seconds, levels = panel.plot.data
+    assert len(seconds) == len(levels) > 1
+    assert seconds[-1] == pytest.approx(0.5)
+    assert all(30.0 < level < 110.0 for level in levels)
+
+
+def test_the_robot_is_drawn_where_it_is(server, monkeypatch):
+    drawn: list[float] = []
+    update = mjviser.ViserMujocoScene.update_from_mjdata
+
+    def noted(scene: mjviser.ViserMujocoScene, data: mujoco.MjData) -> None:
+        drawn.append(float(data.qpos[0]))
+        update(scene, data)
+
+    monkeypatch.setattr(mjviser.ViserMujocoScene, "update_from_mjdata", noted)
+    session = _make_session()
+    scene = PageScene(server, session, None)
+    session.env.simulation.qpos[0, 0] += 3.0
+    scene.update()
+    assert drawn[-1] - drawn[0] == pytest.approx(3.0)
 
 
 def test_the_ground_follows_the_robot_as_boxes_that_are_moved_not_made_anew(server, monkeypatch):
