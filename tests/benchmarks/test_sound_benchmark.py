@@ -20,7 +20,7 @@ def test_it_tells_time_and_memory_of_the_whole_and_the_time_of_each_part(capsys,
     parts = {part["name"]: part for part in content["parts"]}
     assert {name: part["robots"] for name, part in parts.items()} == {
         "whole": 2, "recorder": 2, "sound": 2,
-        "lone recorder": 1, "lone energies": 1, "lone walk": 1,
+        "lone recorder": 1, "lone energies": 1, "lone walk": 1, "lone live sound": 1,
     }  # fmt: skip
     for part in parts.values():
         assert part["simulated"] == pytest.approx(2.1)

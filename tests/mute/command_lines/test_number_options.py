@@ -33,6 +33,7 @@ _COMMANDS = {
     "export": ("export", "ExportArgs"),
     "release": ("release", "ReleaseArgs"),
     "card": ("card", "CardArgs"),
+    "web": ("web", "WebArgs"),
 }
 """Commands, and where their arguments are."""
 
