@@ -109,6 +109,7 @@ export class App implements PanelActions {
 
   stopOrGo(): void {
     const { stands } = this.steering;
+    this.gamepad.release();
     this.ask(() => {
       // A comparison that this ends puts its command back, which may be the one that is wanted.
       if (this.steering.stands === stands) this.steering.stopOrGo();
@@ -117,7 +118,10 @@ export class App implements PanelActions {
 
   /** Shares from -1 to 1 of the speeds that are trained. */
   drive(forward: number, left: number, turn = 0): void {
-    this.ask(() => this.steering.pull(forward, left, turn));
+    // A stick that is held asks many times a second, mostly for what is so already.
+    if (!this.steering.isPulled(forward, left, turn)) {
+      this.ask(() => this.steering.pull(forward, left, turn));
+    }
   }
 
   connected(name: string): void {

@@ -39,6 +39,21 @@ test("who was stopped goes on as before, at the beta of now", () => {
   assert.deepEqual(robot.command, { vx: 0.7, vy: 0, wz: 0.2, beta: 1 });
 });
 
+test("who stands by sliders, or as a stick was let go, goes on as before too", () => {
+  const robot = steering();
+  robot.set({ vx: 0.4 });
+  robot.set({ vx: 0 });
+  robot.stopOrGo();
+  assert.equal(robot.command.vx, 0.4);
+  robot.pull(0, 0, 1);
+  const { wz } = robot.command;
+  assert.ok(wz > 0 && robot.isPulled(0, 0, 1) && !robot.isPulled(0, 0, 0));
+  robot.pull(0, 0, 0);
+  assert.ok(robot.stands && robot.isPulled(0, 0, 0));
+  robot.stopOrGo();
+  assert.deepEqual([robot.command.vx, robot.command.wz], [0, wz]);
+});
+
 test("who came stopped, by an address say, goes as the page begins", () => {
   const robot = new Steering({ vx: 0, vy: 0, wz: 0, beta: 0.8 }, page.command);
   assert.ok(robot.stands);
