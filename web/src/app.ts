@@ -2,6 +2,7 @@
 
 import { Comparing } from "./comparing.js";
 import { Loop } from "./control/loop.js";
+import { Mishaps } from "./control/mishaps.js";
 import { SoundSwitch } from "./control/sound_switch.js";
 import { Steering } from "./control/steering.js";
 import { GamepadInput } from "./input/gamepad.js";
@@ -28,6 +29,7 @@ export class App implements PanelActions {
   private readonly gamepad: GamepadInput;
   private readonly comparing: Comparing;
   private readonly address: AddressBar;
+  private readonly mishaps = new Mishaps();
   private settings: Settings;
 
   constructor(private readonly parts: Parts) {
@@ -189,9 +191,8 @@ export class App implements PanelActions {
 
   private step(): void {
     const outcome = this.live.step(this.steering.command);
-    if (outcome !== "walking") {
-      this.panel.tell(`The robot ${outcome === "fallen" ? "fell" : "blew up"} and starts again.`);
-    }
+    const mishap = this.mishaps.after(outcome, this.live.stepTime);
+    if (mishap) this.panel.tell(mishap);
     this.comparing.follow(outcome);
   }
 
