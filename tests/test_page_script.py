@@ -64,7 +64,7 @@ def test_without_node_the_page_is_skipped_in_a_line(machine: Path):
     assert (result.returncode, result.stderr) == (0, "")
     assert result.stdout == (
         "skipped: the page is neither built nor tested, "
-        "as there is no Node of version 18 or newer with npm\n"
+        "as there is no Node of version 20 or newer with npm\n"
     )
 
 
@@ -72,7 +72,7 @@ def test_a_node_that_is_too_old_or_has_no_npm_is_none(machine: Path):
     _program(machine / "node", "echo 20")
     assert _run(machine).stdout.startswith("skipped: the page is neither built")
     _program(machine / "npm", "exit 0")
-    _program(machine / "node", "echo 16")
+    _program(machine / "node", "echo 18")
     assert _run(machine).stdout.startswith("skipped: the page is neither built")
 
 
@@ -90,17 +90,24 @@ def test_chromium_of_the_path_or_the_variable_is_handed_on(machine: Path, tmp_pa
     own = _program(tmp_path / "my chromium", "exit 0")
     done = _run(machine, CHROMIUM=str(own)).stdout.splitlines()
     assert done == [*_BUILT, "npm run test:browser", str(own)]
+    _program(machine / "my-chromium", "exit 0")
+    named = _run(machine, CHROMIUM="my-chromium").stdout.splitlines()
+    assert named[-1] == str(machine / "my-chromium")
     found = _program(machine / "chromium-browser", "exit 0")
     assert _run(machine).stdout.splitlines() == [*_BUILT, "npm run test:browser", str(found)]
 
 
-def test_a_chromium_that_is_named_and_missing_is_a_failure(machine: Path):
+def test_a_chromium_that_is_named_and_missing_is_a_failure_before_anything_is_done(
+    machine: Path, tmp_path: Path
+):
     _add_node(machine)
-    result = _run(machine, CHROMIUM="/nowhere/chromium")
-    assert (result.returncode, result.stderr) == (
-        1,
-        "error: CHROMIUM=/nowhere/chromium is no program\n",
-    )
+    for name in ("/nowhere/chromium", str(tmp_path), "my-chromium"):
+        result = _run(machine, CHROMIUM=name)
+        assert (result.returncode, result.stderr) == (
+            1,
+            f"error: CHROMIUM={name} is no program\n",
+        )
+        assert not any(line in _BUILT for line in result.stdout.splitlines())
 
 
 def test_node_of_the_python_package_does_where_there_is_no_other(machine: Path, tmp_path: Path):
@@ -114,11 +121,23 @@ def test_node_of_the_python_package_does_where_there_is_no_other(machine: Path, 
     assert not list(tmp_path.glob("tmp.*")), "what it made for a while is gone"
 
 
+@pytest.mark.parametrize("timeout", [True, False])
 @pytest.mark.parametrize("part", ["ci", "build", "check", "test:node", "test:browser"])
-def test_a_part_that_fails_fails_the_check(machine: Path, part: str):
+def test_a_part_that_fails_fails_the_check(machine: Path, part: str, timeout: bool):
     _add_node(machine, f'for word in "$@"; do [ "$word" != {part} ] || exit 3; done')
     _program(machine / "chromium", "exit 0")
-    assert _run(machine).returncode == 3
+    if not timeout:
+        (machine / "timeout").unlink()
+    result = _run(machine)
+    assert (result.returncode, result.stderr) == (3, "")
+
+
+def test_without_a_program_that_limits_time_all_is_done(machine: Path):
+    _add_node(machine)
+    (machine / "timeout").unlink()
+    result = _run(machine)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert [line for line in result.stdout.splitlines() if line in _BUILT] == _BUILT
 
 
 def test_an_interrupt_ends_what_runs(machine: Path, tmp_path: Path):

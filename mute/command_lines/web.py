@@ -53,13 +53,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = args.with_policy_found()
     policy = _audible(args.policy)
     others = [_audible(path) for path in args.also]
-    tasks = {policy.task for policy in (policy, *others)}
+    tasks = [policy.task for policy in (policy, *others)]
+    if len(set(tasks)) < len(tasks):
+        raise MuteError(f"--also: policies must be of different tasks, got {', '.join(tasks)}")
     others += [own for own in map(_audible, policies_that_ship()) if own.task not in tasks]
     make_directory(args.out)
     try:
         files = write_assets([policy, *others], args.out)
     except ValueError as error:
-        raise MuteError(f"--also: {error}") from error
+        raise MuteError(f"--policy {args.policy}: {error}") from error
     if args.reference is not None:
         make_directory(args.reference, "reference")
         try:

@@ -55,7 +55,7 @@ for (const name of readdirSync(out).sort()) {
   print(name, file.length, packed);
 }
 print("in all", bytes, sum);
-if (sum > HEAVIEST) fail(`the page weighs more than ${kilobytes(HEAVIEST)} kB compressed`);
+if (sum > HEAVIEST) fail(`the page weighs more than ${HEAVIEST / 1e6} MB compressed`);
 
 /** Returns the names of the assets that the page asks for; what else lies there stays there. */
 function assetNames() {

@@ -2,6 +2,7 @@
 
 import { Comparing } from "./comparing.js";
 import { Loop } from "./control/loop.js";
+import { Mishaps } from "./control/mishaps.js";
 import { SoundSwitch } from "./control/sound_switch.js";
 import { Steering } from "./control/steering.js";
 import { GamepadInput } from "./input/gamepad.js";
@@ -28,6 +29,7 @@ export class App implements PanelActions {
   private readonly gamepad: GamepadInput;
   private readonly comparing: Comparing;
   private readonly address: AddressBar;
+  private readonly mishaps = new Mishaps();
   private settings: Settings;
 
   constructor(private readonly parts: Parts) {
@@ -109,6 +111,7 @@ export class App implements PanelActions {
 
   stopOrGo(): void {
     const { stands } = this.steering;
+    this.gamepad.release();
     this.ask(() => {
       // A comparison that this ends puts its command back, which may be the one that is wanted.
       if (this.steering.stands === stands) this.steering.stopOrGo();
@@ -117,7 +120,10 @@ export class App implements PanelActions {
 
   /** Shares from -1 to 1 of the speeds that are trained. */
   drive(forward: number, left: number, turn = 0): void {
-    this.ask(() => this.steering.pull(forward, left, turn));
+    // A stick that is held asks many times a second, mostly for what is so already.
+    if (!this.steering.isPulled(forward, left, turn)) {
+      this.ask(() => this.steering.pull(forward, left, turn));
+    }
   }
 
   connected(name: string): void {
@@ -185,9 +191,8 @@ export class App implements PanelActions {
 
   private step(): void {
     const outcome = this.live.step(this.steering.command);
-    if (outcome !== "walking") {
-      this.panel.tell(`The robot ${outcome === "fallen" ? "fell" : "blew up"} and starts again.`);
-    }
+    const mishap = this.mishaps.after(outcome, this.live.stepTime);
+    if (mishap) this.panel.tell(mishap);
     this.comparing.follow(outcome);
   }
 

@@ -59,7 +59,8 @@ export class LiveWalk {
     const { walk, sound, picture, simulation } = this;
     walk.command = command;
     const outcome = walk.step(sound.listener);
-    sound.feed();
+    // What is no number would stay in the sound and in its levels.
+    if (outcome !== "unstable") sound.feed();
     if (outcome === "walking") {
       picture?.keep(simulation);
     } else {

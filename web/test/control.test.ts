@@ -5,6 +5,7 @@ import { test } from "node:test";
 
 import { Clock } from "../src/control/clock.js";
 import { Comparison } from "../src/control/comparison.js";
+import { Mishaps } from "../src/control/mishaps.js";
 import { Rate } from "../src/control/rates.js";
 import { Steering } from "../src/control/steering.js";
 import { withoutSlack } from "../src/input/joystick.js";
@@ -37,6 +38,21 @@ test("who was stopped goes on as before, at the beta of now", () => {
   robot.set({ beta: 1 });
   robot.stopOrGo();
   assert.deepEqual(robot.command, { vx: 0.7, vy: 0, wz: 0.2, beta: 1 });
+});
+
+test("who stands by sliders, or as a stick was let go, goes on as before too", () => {
+  const robot = steering();
+  robot.set({ vx: 0.4 });
+  robot.set({ vx: 0 });
+  robot.stopOrGo();
+  assert.equal(robot.command.vx, 0.4);
+  robot.pull(0, 0, 1);
+  const { wz } = robot.command;
+  assert.ok(wz > 0 && robot.isPulled(0, 0, 1) && !robot.isPulled(0, 0, 0));
+  robot.pull(0, 0, 0);
+  assert.ok(robot.stands && robot.isPulled(0, 0, 0));
+  robot.stopOrGo();
+  assert.deepEqual([robot.command.vx, robot.command.wz], [0, wz]);
 });
 
 test("who came stopped, by an address say, goes as the page begins", () => {
@@ -259,4 +275,14 @@ test("a comparison of what cannot be heard ends, and says so", () => {
   for (let step = 0; step <= 50 * 41; step++) comparison.follow(step / 50, { mnl: NaN, seconds: 0 });
   assert.equal(told.at(-1), "Not compared: in 40 s at β 0 only 0 s could be heard.");
   assert.deepEqual([ended(), comparison.isRunning], [1, false]);
+});
+
+test("each fall is told, and a blow-up once until the robot has walked again", () => {
+  const mishaps = new Mishaps();
+  const told = (...outcomes: ("walking" | "fallen" | "unstable")[]) =>
+    outcomes.flatMap((outcome) => mishaps.after(outcome, 0.02)?.split(" ")[2] ?? []);
+  assert.deepEqual(told("walking", "fallen", "fallen"), ["fell", "fell"]);
+  assert.deepEqual(told("unstable", "unstable", "walking", "unstable"), ["blew"]);
+  const second = Array.from({ length: 51 }, () => "walking" as const);
+  assert.deepEqual(told(...second, "unstable"), ["blew"]);
 });

@@ -5,7 +5,7 @@ import { after, before, test } from "node:test";
 
 import { LONG, Site } from "./browser.js";
 import { walkOf, walks } from "./files.js";
-import { Machine } from "./machine.js";
+import { CORES, coreTime, Machine } from "./machine.js";
 
 let site: Site;
 before(async () => {
@@ -73,11 +73,13 @@ test("the worklet's own samples have Python's level", async () => {
   await page.context().close();
 });
 
-/** What is asked of a desktop with two cores that has nothing else to do. */
+/** What is asked of a desktop with two cores that has nothing else to do: s, Hz, a second. */
 const SOONEST = 3;
 const CONTROL = 49;
 const PICTURES = 30;
-const CORES = 2;
+
+/** Longest time of `coreTime` with which that is asked, s: of cores of 2 GHz or more. */
+const SLOWEST_CORE = 0.15;
 
 /** Visits of which the best one counts: whoever else works here does so in bursts. */
 const VISITS = 3;
@@ -139,9 +141,13 @@ async function unseen(): Promise<number> {
 
 /*
  * Of a machine that others use, too, as much is asked as they leave of it: with half of the processor
- * time the page may take twice as long to begin, and draw half of the pictures.
+ * time the page may take twice as long to begin, and draw half of the pictures. Of slow cores nothing
+ * is asked, and what they do is printed alone.
  */
 test("the page is interactive within 3 s, holds 50 Hz and draws 30 pictures a second", async () => {
+  const core = coreTime();
+  const isHeld = core <= SLOWEST_CORE;
+  console.log(`a core takes ${core.toFixed(3)} s for the loop; what follows is ${isHeld ? "held" : "printed"}`);
   const visits: Awaited<ReturnType<typeof visitAndTime>>[] = [];
   const meets = {
     begun: () => visits.some(({ begun, beginning }) => begun * beginning.free <= SOONEST),
@@ -152,11 +158,11 @@ test("the page is interactive within 3 s, holds 50 Hz and draws 30 pictures a se
   do {
     visits.push(await visitAndTime());
   } while (missed().length && visits.length < VISITS);
-  assert.deepEqual(missed(), [], "of these too little was had in all visits, see above");
+  if (isHeld) assert.deepEqual(missed(), [], "of these too little was had in all visits, see above");
   // What that takes is told in processor time, which hangs little on what others do meanwhile.
   const without = await unseen();
   const costs = visits.map(({ pictures, busy }) => (busy.own - without) / pictures);
   const cores = without + PICTURES * Math.max(Math.min(...costs), 0);
   console.log(`30 pictures a second take ${cores.toFixed(2)} cores, none ${without.toFixed(2)}`);
-  assert.ok(cores <= CORES, `30 pictures a second take ${cores} cores`);
+  assert.ok(!isHeld || cores <= CORES, `30 pictures a second take ${cores} cores`);
 });

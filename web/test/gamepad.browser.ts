@@ -17,7 +17,7 @@ after(async () => site.close());
 /** A gamepad as a browser has it: it is in the list until it is unplugged. */
 function plugPad(): void {
   const buttons = Array.from({ length: 17 }, () => ({ pressed: false }));
-  const pad = { id: "Test pad", connected: true, axes: [0, 0, 0, 0], buttons };
+  const pad = { id: "Test pad", index: 0, connected: true, axes: [0, 0, 0, 0], buttons };
   Object.assign(globalThis, { pad });
   navigator.getGamepads = () => [pad.connected ? (pad as unknown as Gamepad) : null];
 }
@@ -83,6 +83,53 @@ test("a gamepad's sticks drive and turn, its buttons stop, push, hush and begin 
   assert.ok(Math.abs((await stateOf(page)).command.beta - beta) < 1e-9);
   await pressPad(page, 9);
   assert.match(await opened.note(), /starts again/);
+  await leave(opened);
+});
+
+test("a stop holds while a stick is held, until it has rested", async () => {
+  const opened = await site.visit({ before: plugPad });
+  const { page } = opened;
+  await plug(page, true);
+  const pull = (axes: number[]) =>
+    page.evaluate((all) => {
+      (globalThis as unknown as { pad: TestPad }).pad.axes = all;
+    }, axes);
+  const looks = async () => {
+    const { steps } = await page.evaluate(() => globalThis.mute!.app.rates);
+    await page.waitForFunction((old) => globalThis.mute!.app.rates.steps > old + 10, steps, LONG);
+    return (await stateOf(page)).command;
+  };
+  for (const stop of [() => pressPad(page, 0), () => page.keyboard.press("Space")]) {
+    await pull([0, -1, 0, 0]);
+    await until(page, (mute) => mute!.app.state.command.vx === 1);
+    await stop();
+    await pull([0, -0.9, 0, 0]);
+    const { vx, vy, wz } = await looks();
+    assert.deepEqual([vx, vy, wz], [0, 0, 0]);
+    // What was stopped goes on, and not only for as long as the stick is held.
+    await stop();
+    await pull([0, 0, 0, 0]);
+    assert.equal((await looks()).vx, 1);
+    await page.fill("#vx", "0");
+  }
+  await pull([0, -1, 0, 0]);
+  await until(page, (mute) => mute!.app.state.command.vx === 1);
+  await leave(opened);
+});
+
+test("another gamepad that goes takes nothing along", async () => {
+  const opened = await site.visit({ before: plugPad, hash: "#vx=0.4" });
+  const { page } = opened;
+  await plug(page, true);
+  const { steps } = await page.evaluate(() => globalThis.mute!.app.rates);
+  await page.waitForFunction((old) => globalThis.mute!.app.rates.steps > old + 2, steps, LONG);
+  await page.evaluate(() => {
+    const gamepad = { id: "Another", index: 1 };
+    window.dispatchEvent(Object.assign(new Event("gamepaddisconnected"), { gamepad }));
+  });
+  assert.equal((await stateOf(page)).command.vx, 0.4);
+  await plug(page, false);
+  assert.equal((await stateOf(page)).command.vx, 0);
   await leave(opened);
 });
 

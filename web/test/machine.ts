@@ -1,13 +1,16 @@
 /**
- * How busy the machine is, with the browser and with others: what a page does in a second says little
- * of the page where somebody else has the processor. By /proc, and so on Linux alone; elsewhere a
- * machine counts as free.
+ * How busy the machine is, with the browser and with others, and how fast: what a page does in a
+ * second says little of the page where somebody else has the processor, or where it is a slow one. By
+ * /proc and /sys, and so on Linux alone; elsewhere a machine counts as free.
  */
 
 import { readdirSync, readFileSync } from "node:fs";
 
 /** Ticks of a second in /proc, on every Linux there is. */
 const TICKS = 100;
+
+/** Cores that the page is made for. */
+export const CORES = 2;
 
 /** Processor time so far, s. */
 interface Spent {
@@ -21,7 +24,7 @@ interface Spent {
 export interface Busy {
   /** Cores that the browser, and this process, took. */
   readonly own: number;
-  /** Share of the machine that others left to them, from 0 to 1. */
+  /** Share of `CORES` that was left to them, by others and by what a container may take, from 0 to 1. */
   readonly free: number;
   /** Over how long, s. */
   readonly seconds: number;
@@ -39,8 +42,38 @@ export class Machine {
     let own = 0;
     for (const [pid, ticks] of now.own) own += ticks - (this.begun.own.get(pid) ?? 0);
     const others = Math.max(now.all - this.begun.all - own, 0);
-    return { own: own / seconds, free: Math.max(1 - others / (seconds * this.cores), 0), seconds };
+    const left = Math.min(Math.max(this.cores - others / seconds, 0), quota());
+    return { own: own / seconds, free: Math.min(left / CORES, 1), seconds };
   }
+}
+
+/** Turns of the loop of `coreTime`, and how often it is tried. */
+const TURNS = 5e7;
+const TRIES = 3;
+
+/**
+ * Returns the processor time that a core takes for a fixed loop at best, s: 50 million turns of a
+ * generator of random numbers, each of which waits for the one before.
+ */
+export function coreTime(): number {
+  const tries = Array.from({ length: TRIES }, () => {
+    const begun = process.cpuUsage();
+    let x = 1;
+    for (let i = 0; i < TURNS; i++) {
+      x ^= x << 13;
+      x ^= x >>> 17;
+      x ^= x << 5;
+    }
+    const { user, system } = process.cpuUsage(begun);
+    return x === 0 ? NaN : (user + system) / 1e6; // which it never is, but has to be worked out
+  });
+  return Math.min(...tries);
+}
+
+/** Returns the cores that the container may take, of all there are. */
+function quota(): number {
+  const [most, period] = read("/sys/fs/cgroup/cpu.max").split(" ").map(Number);
+  return most && period ? most / period : Infinity;
 }
 
 function spent(): Spent {

@@ -92,6 +92,33 @@ function withNodes(...nodes: (readonly [string, readonly string[], string])[]): 
   return new Uint8Array(Buffer.concat(parts));
 }
 
+/** Returns a policy with another entry of its metadata. */
+function withMetadata(name: string, value: string, file = shipped()): Uint8Array {
+  const entry = Buffer.concat([field(1, letters(name)), field(2, letters(value))]);
+  const parts = [...fields(file)].map(({ number, integer, bytes }) => {
+    if (number === 14 && Buffer.from(bytes).includes(`${name}`)) return field(14, entry);
+    return bytes.length ? field(number, bytes) : Uint8Array.of(8 * number, integer);
+  });
+  return new Uint8Array(Buffer.concat(parts));
+}
+
+test("gains, scales and limits that no robot has are refused, each in one line", () => {
+  const twelve = (value: number) => Array.from({ length: 12 }, () => value).join(",");
+  assert.equal(refusal(withMetadata("joint_stiffness", twelve(35))), "");
+  const refused: readonly (readonly [string, string, RegExp])[] = [
+    ["joint_stiffness", twelve(-5), /joint_stiffness must be from 0 to 10000 N m\/rad, one is -5$/],
+    ["joint_stiffness", twelve(1e7), /one is 10000000$/],
+    ["joint_damping", twelve(-0.5), /joint_damping must be from 0 to 1000 N m s\/rad, one is -0.5$/],
+    ["default_joint_pos", twelve(40), /default_joint_pos must be from -6.28 to 6.28 rad, one is 40$/],
+    ["action_scale", twelve(-0.25), /action_scale must be from 0 to 100 rad, one is -0.25$/],
+    ["action_clip", "-1", /action_clip must be from 0 to 1000000, one is -1$/],
+  ];
+  for (const [name, value, line] of refused) assert.match(refusal(withMetadata(name, value)), line);
+  const scales = { base_ang_vel: 1e9, projected_gravity: 1, joint_pos: 1 };
+  const all = JSON.stringify({ ...scales, joint_vel: 0.05, last_action: 1, command: 1 });
+  assert.match(refusal(withMetadata("observation_scales", all)), /observation_scales must be from/);
+});
+
 test("a policy that would take too long for a control step is refused, one with some more to do is not", () => {
   const { nodes, constants } = readOnnx(shipped());
   const wide = [...constants].find(([, { data }]) => data.length > 20_000)?.[0] ?? "";
@@ -101,6 +128,10 @@ test("a policy that would take too long for a control step is refused, one with 
       ...Array.from({ length: count }, (_, i) => ["Add", [wide, wide], `more ${i}`] as const),
     );
   assert.equal(refusal(adding(3)), "");
+  // What comes more often has less time; what comes more rarely would hold up the page as long.
+  assert.equal(refusal(withMetadata("control_dt", "0.001")), "");
+  assert.match(refusal(withMetadata("control_dt", "0.001", adding(3))), /takes too long/);
+  assert.match(refusal(withMetadata("control_dt", "1", adding(200))), /takes too long/);
   assert.match(refusal(adding(200)), /a control step of it takes too long/);
 });
 

@@ -16,6 +16,7 @@ beforeEach(() => (tab.hidden = false));
 class Noted implements Hearing {
   readonly asked: string[] = [];
   onLevels: ((levels: Levels) => void) | null = null;
+  onEnd: ((why: string) => void) | null = null;
   feed = () => void this.asked.push("feed");
   setSurface = (name: string) => void this.asked.push(name);
   reset = () => void this.asked.push("reset");
@@ -23,6 +24,7 @@ class Noted implements Hearing {
   leaveOut = () => void this.asked.push("fall");
   suspend = async () => void this.asked.push("suspend");
   resume = async () => void this.asked.push("resume");
+  close = () => void this.asked.push("close");
 }
 
 /** A switch whose sound begins when it is let. */
@@ -99,7 +101,7 @@ test("what was heard is of what the robot does now", async () => {
   const hearing = new Noted();
   started[0]?.begin(hearing);
   await done;
-  const levels = { level: 60, mnl: 61, pnl: 65, seconds: 3, waiting: 0.1 };
+  const levels = { level: 60, mnl: 61, pnl: 65, seconds: 3 };
   for (const change of [() => sound.measureAnew(), () => sound.restart(20)]) {
     hearing.onLevels?.(levels);
     assert.equal(sound.levels.mnl, 61);
@@ -108,4 +110,47 @@ test("what was heard is of what the robot does now", async () => {
     assert.equal(sound.levels.seconds, 0);
   }
   assert.deepEqual(hearing.asked.slice(-2), ["measure", "reset"]);
+});
+
+test("sound that ends by itself is told of, is off, and begins anew when it is asked for", async () => {
+  const { sound, started, told, shown } = made();
+  const done = sound.turn(true);
+  const hearing = new Noted();
+  started[0]?.begin(hearing);
+  await done;
+  hearing.onLevels?.({ level: 60, mnl: 61, pnl: 65, seconds: 3 });
+  hearing.onEnd?.("the audio thread failed");
+  assert.deepEqual(told, ["The sound ended: the audio thread failed. It can be switched on again."]);
+  assert.deepEqual([sound.isOn, sound.listener, shown.at(-1)], [false, undefined, [false, false]]);
+  assert.ok(Number.isNaN(sound.levels.mnl));
+  assert.equal(hearing.asked.at(-1), "close");
+  const again = sound.turn(true);
+  started[1]?.begin(new Noted());
+  await again;
+  hearing.onEnd?.("it is gone already"); // which says nothing of the next one
+  assert.ok(sound.isOn);
+  assert.equal(told.length, 1);
+});
+
+test("sound that does not go on is closed, told of, and begun anew when it is asked for", async () => {
+  const { sound, started, told, shown } = made();
+  const done = sound.turn(true);
+  const hearing = new Noted();
+  started[0]?.begin(hearing);
+  await done;
+  hearing.resume = () => Promise.reject(new Error("going on took longer than 15 s"));
+  await sound.turn(false);
+  await sound.turn(true);
+  assert.deepEqual(told, ["There is no sound: going on took longer than 15 s"]);
+  assert.deepEqual([sound.isOn, shown.at(-1)], [false, [false, false]]);
+  assert.equal(hearing.asked.at(-1), "close");
+  const again = sound.turn(true);
+  const next = new Noted();
+  started[1]?.begin(next);
+  await again;
+  next.resume = hearing.resume;
+  await sound.follow(true);
+  await sound.follow(false);
+  assert.match(told.at(-1) ?? "", /^The sound ended: going on took longer than 15 s/);
+  assert.ok(!sound.isOn);
 });

@@ -14,8 +14,6 @@ export interface Levels {
   readonly pnl: number;
   /** Time that both are over, s. */
   readonly seconds: number;
-  /** Time that waits to be heard, s. */
-  readonly waiting: number;
 }
 
 /** Makes sound of batches, and measures it. */
@@ -31,7 +29,11 @@ export interface Hearing {
   leaveOut(): void;
   suspend(): Promise<void>;
   resume(): Promise<void>;
+  /** Ends for good. */
+  close(): void;
   onLevels: ((levels: Levels) => void) | null;
+  /** Is told why it ended by itself. */
+  onEnd: ((why: string) => void) | null;
 }
 
 /** Fills batches from a simulation, physics step by physics step. */

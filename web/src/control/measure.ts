@@ -86,7 +86,7 @@ export function measure(
   const steps = Math.round(walk.seconds / robot.stepTime);
   for (let step = 0; step < steps; step++) {
     const outcome = robot.step(batcher.listen);
-    hearing.feed(batcher.take());
+    if (outcome !== "unstable") hearing.feed(batcher.take());
     if (outcome === "walking") continue;
     batcher.restart(simulation);
     hearing.leaveOut();

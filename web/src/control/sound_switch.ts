@@ -14,7 +14,7 @@ export interface SoundTold {
   tell(line: string, isFault: boolean): void;
 }
 
-const SILENCE: Levels = { level: NaN, mnl: NaN, pnl: NaN, seconds: 0, waiting: 0 };
+const SILENCE: Levels = { level: NaN, mnl: NaN, pnl: NaN, seconds: 0 };
 
 export class SoundSwitch {
   /** What was heard of the walk; NaN while there is none. */
@@ -101,7 +101,7 @@ export class SoundSwitch {
     try {
       await (hidden ? this.hearing?.suspend() : this.hearing?.resume());
     } catch (error) {
-      this.shown.tell(`Sound: ${messageOf(error)}`, true);
+      this.end(messageOf(error));
     }
   }
 
@@ -121,7 +121,7 @@ export class SoundSwitch {
       if (this.on) this.forget();
       if (on && document.hidden) await this.follow(true);
     } catch (error) {
-      this.on = false;
+      this.drop();
       this.shown.tell(`There is no sound: ${messageOf(error)}`, true);
     }
   }
@@ -132,7 +132,25 @@ export class SoundSwitch {
     // The floor may be another one by now.
     hearing.setSurface(this.simulation.floor.name);
     hearing.onLevels = (levels) => this.take(levels);
+    hearing.onEnd = (why) => {
+      if (this.hearing === hearing) this.end(why);
+    };
     return hearing;
+  }
+
+  /** Sound that ended by itself may be begun anew. */
+  private end(why: string): void {
+    this.drop();
+    this.shown.showSound(false, this.changing !== null);
+    this.shown.tell(`The sound ended: ${why}. It can be switched on again.`, true);
+  }
+
+  private drop(): void {
+    this.on = false;
+    this.hearing?.close();
+    this.hearing = null;
+    this.levels = SILENCE;
+    this.shown.showLevels(SILENCE, 0);
   }
 
   private take(levels: Levels): void {

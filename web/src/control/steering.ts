@@ -38,16 +38,21 @@ export class Steering {
       // Rounded, so that steps of 0.1 come back to exactly 0, which asks to stand.
       next[axis] = Math.min(Math.max(Math.round(1e6 * value) / 1e6, low), high);
     }
+    const before = this.current;
+    const moved = !this.stands;
     this.current = next;
+    if (moved && this.stands) this.going = before;
   }
 
   /** Sets speeds by hand: shares from -1 to 1 of those that are trained. */
   pull(forward: number, left: number, turn: number): void {
-    const part = (share: number, axis: "vx" | "vy" | "wz") => {
-      const [low, high] = this.page.trained[axis];
-      return FINENESS * Math.round((share < 0 ? -share * low : share * high) / FINENESS);
-    };
-    this.set({ vx: part(forward, "vx"), vy: part(left, "vy"), wz: part(turn, "wz") });
+    this.set(this.pulled(forward, left, turn));
+  }
+
+  /** Returns whether such a pull would change nothing. */
+  isPulled(forward: number, left: number, turn: number): boolean {
+    const wanted = Object.entries(this.pulled(forward, left, turn)) as [Axis, number][];
+    return wanted.every(([axis, value]) => Math.abs(this.current[axis] - value) < FINENESS / 2);
   }
 
   /** Adds to a part of the command. */
@@ -58,10 +63,14 @@ export class Steering {
   /** Asks to stand or, if that is what was asked, to go on as before. */
   stopOrGo(): void {
     const { beta } = this.current;
-    if (this.stands) this.set({ ...this.going, beta });
-    else {
-      this.going = this.current;
-      this.set({ vx: 0, vy: 0, wz: 0 });
-    }
+    this.set(this.stands ? { ...this.going, beta } : { vx: 0, vy: 0, wz: 0 });
+  }
+
+  private pulled(forward: number, left: number, turn: number) {
+    const part = (share: number, axis: "vx" | "vy" | "wz") => {
+      const [low, high] = this.page.trained[axis];
+      return FINENESS * Math.round((share < 0 ? -share * low : share * high) / FINENESS);
+    };
+    return { vx: part(forward, "vx"), vy: part(left, "vy"), wz: part(turn, "wz") };
   }
 }

@@ -27,10 +27,18 @@ const BETA_STEP = 0.1;
 export class GamepadInput {
   private pressed = new Set<number>();
   private drives = false;
+  /** Whether sticks that are held count as let go, until they rest. */
+  private released = false;
+  /** Which of all gamepads it is, once there is one. */
+  private index: number | null = null;
 
   constructor(private readonly actions: PadActions) {
     window.addEventListener("gamepadconnected", ({ gamepad }) => actions.connected(gamepad.id));
     window.addEventListener("gamepaddisconnected", ({ gamepad }) => {
+      // Another one that goes takes nothing along.
+      if (this.index !== null && gamepad.index !== this.index) return;
+      this.index = null;
+      this.pressed.clear();
       this.letGo();
       actions.lost(gamepad.id);
     });
@@ -40,10 +48,17 @@ export class GamepadInput {
   poll(): void {
     const pad = navigator.getGamepads?.().find((found) => found?.connected);
     if (!pad) return;
+    this.index = pad.index;
     this.readSticks(pad);
     for (const index of [STOP, PUSH, LESS_QUIET, QUIETER, RESTART]) {
       if (this.isNewlyPressed(pad, index)) this.press(index);
     }
+  }
+
+  /** Takes sticks that are held for let go, until they rest: who stops the robot wants it to stand. */
+  release(): void {
+    this.released ||= this.drives;
+    this.drives = false;
   }
 
   private press(button: number): void {
@@ -56,7 +71,9 @@ export class GamepadInput {
   private readSticks(pad: Gamepad): void {
     const pull = (axis: number) => -withoutSlack(pad.axes[axis] ?? 0) || 0;
     const [x, y, turn] = [pull(0), pull(1), pull(2)];
-    const pulled = x !== 0 || y !== 0 || turn !== 0;
+    const held = x !== 0 || y !== 0 || turn !== 0;
+    this.released &&= held;
+    const pulled = held && !this.released;
     // A stick that rests leaves the command to keys and sliders.
     if (pulled) this.actions.drive(y, x, turn);
     else this.letGo();

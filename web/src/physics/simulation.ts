@@ -15,6 +15,9 @@ export type Ground = "flat" | "stairs";
 /** What is told after every physics step. */
 export type Listener = (simulation: Simulation) => void;
 
+/** Where MuJoCo itself takes a position for a blow-up (mjMAXVAL), m or rad. */
+const FURTHEST = 1e10;
+
 export class Simulation {
   /** Physics step, s. */
   readonly timestep: number;
@@ -170,8 +173,11 @@ export class Simulation {
 
   /** Whether the numbers blew up. */
   get unstable(): boolean {
-    // Negated, so that what is no number counts as too fast.
-    return !this.qvel.every((speed) => Math.abs(speed) < this.page.max_speed);
+    // Negated, so that what is no number counts as too fast, or too far.
+    return !(
+      this.qvel.every((speed) => Math.abs(speed) < this.page.max_speed) &&
+      this.qpos.every((position) => Math.abs(position) < FURTHEST)
+    );
   }
 
   /** Cosine of the trunk's tilt. */

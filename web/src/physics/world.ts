@@ -39,6 +39,8 @@ export class World {
     readonly model: MjModel,
     page: PageData,
   ) {
+    // What blows up stays so, to be noticed: MuJoCo would lay the robot back to where it began, unasked.
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value;
     this.data = new mujoco.MjData(model);
     this.scratch = new mujoco.MjData(model);
     const first = page.legs[0];

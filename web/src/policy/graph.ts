@@ -20,9 +20,11 @@ export interface Graph {
 /**
  * Makes a graph ready to run.
  *
+ * @param file What was read.
+ * @param period Time in which it has to run once, s.
  * @throws RangeError If it has an operator, or a use of one, that no policy of ours has.
  */
-export function buildGraph(file: OnnxFile): Graph {
+export function buildGraph(file: OnnxFile, period: number): Graph {
   const values = new Map<string, Tensor>(file.constants);
   const inputs = new Map<string, Float32Array>();
   for (const [name, shape] of file.inputs) {
@@ -31,11 +33,12 @@ export function buildGraph(file: OnnxFile): Graph {
     values.set(name, tensor);
     inputs.set(name, tensor.data);
   }
+  const most = MOST_WORK * Math.min(period / USUAL_PERIOD, 1);
   let work = 0;
   const steps = file.nodes.map((node) => {
     const [step, own] = build(node, values);
     work += own;
-    if (work > MOST_WORK) throw new RangeError("a control step of it takes too long");
+    if (work > most) throw new RangeError("a control step of it takes too long");
     return step;
   });
   const outputs = new Map<string, Float32Array>();
@@ -55,10 +58,12 @@ type Builder = (node: OnnxNode, inputs: Tensor[]) => [outputs: Tensor[], step: S
 const MOST_NUMBERS = 1_000_000;
 
 /**
- * Multiply-adds, or other operations on one number, that a control step may take: some milliseconds
- * of its 20. The policy that ships takes 0.15 million.
+ * Multiply-adds, or other operations on one number, that a control step of the usual period, s, may
+ * take: some milliseconds of its 20. One that comes more often may take less, one that comes more
+ * rarely no more, as the page stands still for it. The policy that ships takes 0.15 million.
  */
 const MOST_WORK = 4_000_000;
+const USUAL_PERIOD = 0.02;
 
 /** Returns what an operator takes: a product its weights, the rest a number each of what it makes. */
 function workOf(node: OnnxNode, inputs: readonly Tensor[], outputs: readonly Tensor[]): number {

@@ -41,6 +41,16 @@ const WIDTHS: Readonly<Record<keyof Observation, number>> = {
   command: 4,
 };
 
+/** What is allowed: those of gains and scales are what Python takes, too. */
+const RANGES: Readonly<Record<string, readonly [least: number, most: number, unit: string]>> = {
+  joint_stiffness: [0, 1e4, " N m/rad"],
+  joint_damping: [0, 1e3, " N m s/rad"],
+  default_joint_pos: [-2 * Math.PI, 2 * Math.PI, " rad"],
+  action_scale: [0, 100, " rad"],
+  action_clip: [0, 1e6, ""],
+  observation_scales: [-1e6, 1e6, ""],
+};
+
 const COMMAND_NAMES = "lin_vel_x,lin_vel_y,ang_vel_z,beta";
 
 /** Bytes of the largest file that is read. */
@@ -87,15 +97,15 @@ export class Policy {
       const metadata = new Metadata(onnx.metadata);
       metadata.exactly("joint_names", robot.jointNames.join(","));
       metadata.exactly("command_names", COMMAND_NAMES);
-      this.stiffness = Float64Array.from(metadata.numbers("joint_stiffness", 12));
-      this.damping = Float64Array.from(metadata.numbers("joint_damping", 12));
-      this.defaultJointPos = Float32Array.from(metadata.numbers("default_joint_pos", 12));
-      this.actionScale = Float32Array.from(metadata.numbers("action_scale", 12));
-      this.actionClip = metadata.number("action_clip");
+      this.stiffness = Float64Array.from(metadata.within("joint_stiffness", 12));
+      this.damping = Float64Array.from(metadata.within("joint_damping", 12));
+      this.defaultJointPos = Float32Array.from(metadata.within("default_joint_pos", 12));
+      this.actionScale = Float32Array.from(metadata.within("action_scale", 12));
+      this.actionClip = metadata.within("action_clip", 1)[0] as number;
       this.decimation = metadata.steps("control_dt", robot.timestep);
       this.order = metadata.observationNames();
       this.scales = metadata.scales(this.order);
-      this.graph = buildGraph(onnx);
+      this.graph = buildGraph(onnx, this.decimation * robot.timestep);
       this.remembered = metadata.recurrentState().map(([into, from]) => {
         return [buffer(this.graph.inputs, into), buffer(this.graph.outputs, from)];
       });
@@ -155,6 +165,14 @@ function buffer(buffers: ReadonlyMap<string, Float32Array>, name: string): Float
   return found;
 }
 
+/** Returns a value that is within its range. */
+function checked(name: string, value: number): number {
+  const [least, most, unit] = RANGES[name] ?? [-Infinity, Infinity, ""];
+  if (value >= least && value <= most) return value;
+  const [low, high] = [least, most].map((end) => `${Math.round(100 * end) / 100}`);
+  throw new RangeError(`its ${name} must be from ${low} to ${high}${unit}, one is ${value}`);
+}
+
 /** The metadata of an export, checked. */
 class Metadata {
   constructor(private readonly entries: ReadonlyMap<string, string>) {}
@@ -181,6 +199,11 @@ class Metadata {
     return values;
   }
 
+  /** The same, each of which has to be within its range. */
+  within(name: string, count: number): number[] {
+    return this.numbers(name, count).map((value) => checked(name, value));
+  }
+
   /** Returns how many physics steps a time takes. */
   steps(name: string, timestep: number): number {
     const time = this.number(name);
@@ -203,7 +226,7 @@ class Metadata {
     return names.map((name) => {
       const scale = scales[name];
       if (typeof scale !== "number") throw new RangeError(`it does not tell the scale of ${name}`);
-      return scale;
+      return checked("observation_scales", scale);
     });
   }
 

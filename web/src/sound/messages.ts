@@ -33,8 +33,6 @@ export interface Levels {
 
 /** What is told twenty times a second. */
 export interface FromProcessor extends Levels {
-  /** Time that waits to be heard, s. */
-  readonly waiting: number;
   /** Number of the walk that this is of: that of the last message with one, or 0. */
   readonly walk: number;
 }

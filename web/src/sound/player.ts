@@ -1,5 +1,6 @@
 /** The page's end of the sound: starts the audio thread, and gives it what the physics tells. */
 
+import { PATIENCE, within } from "../support/patience.js";
 import {
   type FromProcessor,
   type Levels,
@@ -23,20 +24,38 @@ const LOWEST = 50;
 /** Samples beyond full scale that can still be told apart, in full scales. */
 const BEYOND = 8;
 
+/** Time after which a context that does not run is taken for one that ended, ms: some pause as the tab hides. */
+const GRACE = 1000;
+
 /** Plays batches of readings as they come. Made by `startPlayer`. */
 export class Player {
   /** Is told the levels, twenty times a second while there is sound. */
   onLevels: ((levels: Levels) => void) | null = null;
+  /** Is told why there is no sound any more, once it ended by itself. */
+  onEnd: ((why: string) => void) | null = null;
   private walk = 0;
+  private plays = true;
+  /** Changes of the context that were asked for and are on their way. */
+  private asked = 0;
 
   constructor(
     private readonly context: AudioContext,
     private readonly node: AudioWorkletNode,
+    grace = GRACE,
   ) {
     node.port.onmessage = (event: MessageEvent<FromProcessor>) => {
       // What was said before the audio thread heard of a new walk is of the one before.
       if (event.data.walk === this.walk) this.onLevels?.(event.data);
     };
+    node.onprocessorerror = () => this.onEnd?.("the audio thread failed");
+    context.onstatechange = () => {
+      if (this.isOver) setTimeout(() => this.isOver && this.onEnd?.("the browser stopped it"), grace);
+    };
+  }
+
+  /** Whether it does not run though it should, as where a device is lost, and nobody is about to change that. */
+  private get isOver(): boolean {
+    return this.plays && this.asked === 0 && this.context.state !== "running";
   }
 
   /** Takes physics steps in the order of time; the array is given away where it can be. */
@@ -70,13 +89,35 @@ export class Player {
 
   /** Stops, where it is; time stands still for what is heard. */
   suspend(): Promise<void> {
-    return this.context.suspend();
+    this.plays = false;
+    return this.change(this.context.suspend(), "stopping");
   }
 
   /** Goes on from there. */
   resume(): Promise<void> {
-    return this.context.resume();
+    this.plays = true;
+    return this.change(this.context.resume(), "going on");
   }
+
+  /** Ends for good. */
+  close(): void {
+    this.plays = false;
+    closeContext(this.context);
+  }
+
+  private async change(context: Promise<void>, what: string): Promise<void> {
+    this.asked++;
+    try {
+      await within(context, what);
+    } finally {
+      this.asked--;
+    }
+  }
+}
+
+/** Closes a context, whatever comes of it: why it is closed is told, and nothing else. */
+function closeContext(context: AudioContext): void {
+  context.close().catch(() => undefined);
 }
 
 /**
@@ -101,35 +142,47 @@ export function openContext(sampleRate: number): AudioContext {
  * @param loading What Python worked out, which may still be on its way.
  * @param worklet Address of the bundled `worklet.ts`.
  * @param options Floor and more.
- * @throws Error That says in a line what is missing.
+ * @param patience Longest time that any part of it may take, ms.
+ * @throws Error That says in a line what is missing, or took too long.
  */
 export async function startPlayer(
   context: AudioContext,
   loading: SoundTables | Promise<SoundTables>,
   worklet: string,
   options: SoundscapeOptions,
+  patience = PATIENCE,
 ): Promise<Player> {
   try {
-    const tables = await loading;
+    const tables = await within(Promise.resolve(loading), "loading it", patience);
     if (!("audioWorklet" in context)) {
       throw new Error("this browser has no audio worklets here; they need https or localhost");
     }
-    await context.audioWorklet.addModule(worklet);
-    const processorOptions: ProcessorOptions = { tables, soundscape: options };
-    const node = new AudioWorkletNode(context, PROCESSOR, {
-      numberOfInputs: 0,
-      outputChannelCount: [2],
-      processorOptions,
-    });
-    const volume = new GainNode(context, { gain: tables.full_scale / LOUDEST });
-    const lowCut = new BiquadFilterNode(context, { type: "highpass", frequency: LOWEST, Q: -3 });
-    limit(context, node.connect(lowCut).connect(volume)).connect(context.destination);
-    await context.resume();
+    await within(context.audioWorklet.addModule(worklet), `loading ${worklet}`, patience);
+    const node = connect(context, tables, options);
+    await within(context.resume(), "beginning to play", patience);
     return new Player(context, node);
   } catch (error) {
-    await context.close();
+    closeContext(context);
     throw error;
   }
+}
+
+/** Makes the audio thread's part, and returns it once it is to be heard. */
+function connect(
+  context: AudioContext,
+  tables: SoundTables,
+  soundscape: SoundscapeOptions,
+): AudioWorkletNode {
+  const processorOptions: ProcessorOptions = { tables, soundscape };
+  const node = new AudioWorkletNode(context, PROCESSOR, {
+    numberOfInputs: 0,
+    outputChannelCount: [2],
+    processorOptions,
+  });
+  const volume = new GainNode(context, { gain: tables.full_scale / LOUDEST });
+  const lowCut = new BiquadFilterNode(context, { type: "highpass", frequency: LOWEST, Q: -3 });
+  limit(context, node.connect(lowCut).connect(volume)).connect(context.destination);
+  return node;
 }
 
 /**

@@ -67,14 +67,12 @@ class SoundProcessor extends AudioWorkletProcessor {
   }
 
   private tell(): void {
-    const { meter, waiting } = this.playback;
-    const { level, mnl, pnl, readings } = meter;
+    const { level, mnl, pnl, readings } = this.playback.meter;
     const told: FromProcessor = {
       level,
       mnl,
       pnl,
       seconds: readings / this.readingsPerSecond,
-      waiting,
       walk: this.walk,
     };
     this.port.postMessage(told);

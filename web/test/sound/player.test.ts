@@ -2,10 +2,12 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { setTimeout as sleep } from "node:timers/promises";
 import { type FromProcessor, PROCESSOR, type ToProcessor } from "../../src/sound/messages";
 import { openContext, Player, startPlayer } from "../../src/sound/player";
 import { Playback } from "../../src/sound/playback";
 import { READINGS_LENGTH } from "../../src/sound/readings";
+import type { SoundTables } from "../../src/sound/tables";
 import { readReferences, readTables, readWalk } from "./walks";
 
 const references = readReferences();
@@ -135,4 +137,84 @@ test("a context runs from the gesture on, and is closed where anything is missin
   const missing = Promise.reject(new Error("sound.bin cannot be loaded (404)"));
   await assert.rejects(startPlayer(context, missing, "worklet.js", { surface: "wood" }), /sound\.bin/);
   assert.equal(bare.closed, 2);
+});
+
+test("that a context cannot be closed does not hide why it should be", async () => {
+  const bare = new Bare();
+  bare.close = () => Promise.reject(new Error("it is closed already"));
+  const context = bare as unknown as AudioContext;
+  await assert.rejects(startPlayer(context, tables, "worklet.js", { surface: "wood" }), /https or localhost/);
+});
+
+/** Something that others are connected to. */
+class Wired {
+  readonly port = new Port<ToProcessor>();
+  onprocessorerror: (() => void) | null = null;
+  connect(next: unknown): unknown {
+    return next;
+  }
+}
+
+/** A context that has all there is, and whose state is set by hand. */
+class Whole extends Bare {
+  state = "running";
+  onstatechange: (() => void) | null = null;
+  readonly audioWorklet = { addModule: async () => undefined };
+  become(state: string): void {
+    this.state = state;
+    this.onstatechange?.();
+  }
+  async suspend(): Promise<void> {
+    this.become("suspended");
+  }
+  override async resume(): Promise<void> {
+    this.become("running");
+  }
+}
+
+const never = () => new Promise<never>(() => undefined);
+const parts = ["AudioWorkletNode", "GainNode", "BiquadFilterNode", "WaveShaperNode"];
+Object.assign(globalThis, Object.fromEntries(parts.map((part) => [part, Wired])));
+const begin = (context: Whole, loading: SoundTables | Promise<SoundTables> = tables) =>
+  startPlayer(context as unknown as AudioContext, loading, "worklet.js", { surface: "wood" }, 20);
+
+test("what never comes is not waited for, is told of, and its context is closed", async () => {
+  const [one, two, three] = [new Whole(), new Whole(), new Whole()];
+  await assert.rejects(begin(one, never()), /^Error: loading it took longer than 0\.02 s$/);
+  two.audioWorklet.addModule = never;
+  await assert.rejects(begin(two), /loading worklet\.js took longer/);
+  three.resume = never;
+  await assert.rejects(begin(three), /beginning to play took longer/);
+  assert.deepEqual([one.closed, two.closed, three.closed], [1, 1, 1]);
+});
+
+test("sound that ends by itself says so, and what was asked for is no end", async () => {
+  const context = new Whole();
+  const node = new Wired() as unknown as AudioWorkletNode;
+  const player = new Player(context as unknown as AudioContext, node, 20);
+  const ends: string[] = [];
+  player.onEnd = (why) => ends.push(why);
+  for (const asked of [player.suspend(), player.resume()]) await asked;
+  context.become("interrupted");
+  await player.suspend(); // the tab was about to be hidden
+  await sleep(60);
+  await player.resume();
+  await sleep(60);
+  assert.deepEqual(ends, []);
+  context.become("interrupted");
+  await sleep(60);
+  assert.deepEqual(ends, ["the browser stopped it"]);
+  player.close();
+  context.become("closed");
+  await sleep(60);
+  assert.equal(ends.length, 1);
+});
+
+test("an audio thread that fails says so", () => {
+  const node = new Wired();
+  const player = new Player(new Whole() as unknown as AudioContext, node as unknown as AudioWorkletNode);
+  const ends: string[] = [];
+  player.onEnd = (why) => ends.push(why);
+  node.onprocessorerror?.();
+  assert.deepEqual(ends, ["the audio thread failed"]);
 });
