@@ -69,7 +69,7 @@ export class App implements PanelActions {
     makeJoystick(anyElement("pad"), anyElement("knob"), (forward, left) =>
       this.drive(forward, 0, left),
     );
-    this.address.listen((settings, faults) => this.takeAddress(settings, faults));
+    this.address.listen((settings, faults) => void this.takeAddress(settings, faults));
     this.loop.run();
   }
 
@@ -137,6 +137,7 @@ export class App implements PanelActions {
   }
 
   push(): void {
+    this.comparing.stop(); // of a robot that stumbles nothing can be told
     this.panel.tell(`Pushed to the ${this.live.push()} by ${PUSH} m/s.`);
   }
 
@@ -225,15 +226,17 @@ export class App implements PanelActions {
     this.keep({ controller: name });
   }
 
-  private takeAddress(settings: Settings, faults: readonly string[]): void {
+  private async takeAddress(settings: Settings, faults: readonly string[]): Promise<void> {
     this.ask(() => this.steering.set(settings.command));
     const { floor, ground, level, controller } = settings;
     if (floor !== this.settings.floor) this.setFloor(floor);
     if (ground !== this.settings.ground || level !== this.settings.level) {
       this.setGround(ground, level);
     }
-    if (controller !== this.settings.controller) this.setController(controller);
+    const other = controller !== this.settings.controller && this.drivers.choose(controller);
     if (faults.length) this.panel.tellFaults(faults);
+    // Again after what is told of who drives.
+    if ((await other) && faults.length) this.panel.tellFaults(faults);
   }
 
   /** A file of the visitor's own cannot be shared by an address. */

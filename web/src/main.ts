@@ -14,6 +14,9 @@ import { Panel } from "./ui/panel.js";
 const NO_SOUND =
   "There is no sound in this browser, or not here: audio worklets need https or localhost.";
 
+const LOST =
+  "The picture is lost: the browser gave WebGL up. The robot walks unseen; reload the page to see it.";
+
 async function begin(): Promise<void> {
   const loaded = await load();
   const { page, mujoco, scenes, settings, faults } = loaded;
@@ -26,6 +29,7 @@ async function begin(): Promise<void> {
   const panel = new Panel(page);
   const app = new App({ page, simulation, shelf, first, settings, picture, panel, startHearing });
   panel.ready(why);
+  if (picture) tellOfLoss(panel);
   if (!startHearing) panel.showNoSound();
   if (faults.length) panel.tellFaults(faults);
   else panel.tell(startHearing ? welcome(settings.floor) : NO_SOUND);
@@ -51,6 +55,13 @@ function makePicture(make: () => Picture): [Picture | null, string] {
     const why = hasWebgl() ? messageOf(error) : "WebGL is missing";
     return [null, `There is no picture: ${why}. The robot walks unseen.`];
   }
+}
+
+/** Tells where the graphics card, or the browser, gives the picture up, and shows it once it is back. */
+function tellOfLoss(panel: Panel): void {
+  const view = canvas("view");
+  view.addEventListener("webglcontextlost", () => panel.ready(LOST));
+  view.addEventListener("webglcontextrestored", () => panel.ready());
 }
 
 function welcome(floor: string): string {

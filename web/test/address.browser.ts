@@ -46,6 +46,27 @@ test("a damaged address is told of in one line, and the rest of it holds", async
   await leave(opened);
 });
 
+test("what is damaged stays told of, also where another policy drives from then on", async () => {
+  const opened = await site.visit();
+  const { page } = opened;
+  await page.setInputFiles("#file", "assets/go1_mute.onnx");
+  await page.waitForFunction(() => /onnx drives/.test(document.getElementById("note")!.textContent!));
+  const told = await page.evaluate(async () => {
+    const lines: string[] = [];
+    const note = document.getElementById("note")!;
+    const watch = new MutationObserver(() => lines.push(note.textContent!));
+    watch.observe(note, { childList: true });
+    window.location.hash = "#vx=1e9&controller=go1_mute";
+    while (globalThis.mute!.app.state.settings.controller !== "go1_mute") {
+      await new Promise((resolve) => setTimeout(resolve, 10));
+    }
+    await new Promise((resolve) => setTimeout(resolve, 100));
+    return [...lines, note.textContent!];
+  });
+  assert.match(told.at(-1) ?? "", /^Left out: the address has vx=1e9/);
+  await leave(opened);
+});
+
 test("a robot that comes stopped by its address goes at a click", async () => {
   const opened = await site.visit({ hash: "#vx=0&vy=0&wz=0&beta=0.7" });
   const { page } = opened;

@@ -38,7 +38,7 @@ test("of two policies that are asked for, the last one drives, though it comes f
   come("quick");
   await quick;
   come("slow");
-  await slow;
+  assert.deepEqual([await quick, await slow], [true, false]);
   assert.deepEqual(used, ["quick"]);
   assert.deepEqual(told, ["quick drives from now on."]);
 });

@@ -5,7 +5,7 @@ import { test } from "node:test";
 
 import { ReadingsBatcher } from "../src/control/hearing.js";
 import type { SoundSwitch } from "../src/control/sound_switch.js";
-import { measure } from "../src/control/measure.js";
+import { KeptReadings, measure } from "../src/control/measure.js";
 import { Walk } from "../src/control/walk.js";
 import { LiveWalk } from "../src/live_walk.js";
 import { loadPhysics } from "../src/physics/mujoco.js";
@@ -114,4 +114,19 @@ test("a measurement has nothing of a blow-up in its levels either", () => {
     },
   );
   assert.ok(mnl > 50 && pnl < 90, `MNL ${mnl} dBA, PNL ${pnl}`);
+});
+
+test("a measurement that fails leaves no robot behind", () => {
+  const robot = new Simulation(mujoco, scenes, page);
+  let deleted = 0;
+  const free = robot.delete.bind(robot);
+  robot.delete = () => {
+    deleted++;
+    free();
+  };
+  const walk = { command: page.command.start, seconds: 1, terrain: "flat", level: 0 } as const;
+  const lava = () =>
+    measure(robot, policy, page, () => new KeptReadings(), { ...walk, surface: "lava" });
+  assert.throws(lava, /there is no floor lava/);
+  assert.equal(deleted, 1);
 });

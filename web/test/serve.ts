@@ -13,6 +13,9 @@ const TYPES: Readonly<Record<string, string>> = {
   ".wasm": "application/wasm",
 };
 
+/** What `docs/web.md` says that a content security policy needs, and nothing more. */
+const POLICY = "default-src 'self'; script-src 'self' 'unsafe-eval'; img-src 'self' data:";
+
 /** Serves a folder; returns its address and what ends it. */
 export async function serve(folder: string): Promise<{ address: string; close: () => void }> {
   const server: Server = createServer((request, response) => {
@@ -21,7 +24,11 @@ export async function serve(folder: string): Promise<{ address: string; close: (
     try {
       const { size } = statSync(file);
       const type = TYPES[extname(file)] ?? "application/octet-stream";
-      response.writeHead(200, { "content-type": type, "content-length": size });
+      response.writeHead(200, {
+        "content-type": type,
+        "content-length": size,
+        "content-security-policy": POLICY,
+      });
       createReadStream(file).pipe(response);
     } catch {
       response.writeHead(404).end("not found");

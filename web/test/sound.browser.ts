@@ -182,6 +182,11 @@ test("a button compares ten seconds at beta 0 and at beta 1, and puts all back",
   assert.match((await page.textContent("#comparison")) ?? "", /was stopped/);
   const { command } = await stateOf(page);
   assert.deepEqual([command.vx, command.beta], [0.2, 0.3]);
+  await page.click("#compare");
+  await page.waitForFunction(() => /walks/.test(document.getElementById("comparison")!.textContent!));
+  await page.click("#push");
+  assert.match((await page.textContent("#comparison")) ?? "", /was stopped/);
+  assert.match(await opened.note(), /Pushed/);
   await leave(opened);
 });
 

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 
-import { Site } from "./browser.js";
+import { LONG, Site } from "./browser.js";
 import { hide, leave, until } from "./page.js";
 
 let site: Site;
@@ -82,6 +82,31 @@ test("a picture that fails for another reason says which, and the robot walks on
     await opened.page.textContent("#loading"),
     "There is no picture: the canvas cannot be watched. The robot walks unseen.",
   );
+  await leave(opened);
+});
+
+test("a picture that is lost is told of, and the robot walks on, also once it is back", async () => {
+  const opened = await site.visit();
+  const { page } = opened;
+  const loading = page.locator("#loading");
+  await page.evaluate(() => {
+    const context = (document.getElementById("view") as HTMLCanvasElement).getContext("webgl2")!;
+    const loss = context.getExtension("WEBGL_lose_context")!;
+    Object.assign(globalThis, { loss });
+    loss.loseContext();
+  });
+  await page.waitForFunction(() => !document.getElementById("loading")!.hidden, null, LONG);
+  assert.equal(
+    await loading.textContent(),
+    "The picture is lost: the browser gave WebGL up. The robot walks unseen; reload the page to see it.",
+  );
+  const { seconds } = await page.evaluate(() => globalThis.mute!.app.rates);
+  await page.waitForFunction((old) => globalThis.mute!.app.rates.seconds > old + 1, seconds, LONG);
+  await page.evaluate(() => {
+    (globalThis as unknown as { loss: WEBGL_lose_context }).loss.restoreContext();
+  });
+  await page.waitForFunction(() => document.getElementById("loading")!.hidden, null, LONG);
+  await opened.picture("restored");
   await leave(opened);
 });
 

@@ -77,6 +77,14 @@ export function measure(
   hear: (surface: string) => OfflineHearing,
   walk: MeasuredWalk,
 ): Measured {
+  try {
+    return walked(simulation, policy, page, hear, walk);
+  } finally {
+    simulation.delete();
+  }
+}
+
+function walked(...[simulation, policy, page, hear, walk]: Parameters<typeof measure>): Measured {
   simulation.setFloor(walk.surface);
   simulation.setGround(walk.terrain, walk.level);
   const robot = new Walk(simulation, policy, page, walk.command);
@@ -92,6 +100,5 @@ export function measure(
     hearing.leaveOut();
   }
   const qpos = Array.from(simulation.qpos);
-  simulation.delete();
   return { gait: robot.gait(), mnl: hearing.mnl, pnl: hearing.pnl, qpos };
 }

@@ -30,18 +30,20 @@ export class Drivers {
     private readonly keep: () => void,
   ) {}
 
-  /** Lets a policy of the shelf drive, once it is loaded. */
-  async choose(name: string): Promise<void> {
+  /** Lets a policy of the shelf drive, once it is loaded; returns whether it does. */
+  async choose(name: string): Promise<boolean> {
     const isWanted = this.asked.ask();
     try {
       const policy = await this.shelf.get(name);
-      if (!isWanted()) return;
+      if (!isWanted()) return false;
       this.use(name, policy);
       this.told.tell(`${this.shelf.label(name)} drives from now on.`);
+      return true;
     } catch (error) {
-      if (!isWanted()) return;
+      if (!isWanted()) return false;
       this.keep();
       this.told.tell(`${name}: ${messageOf(error)}`, true);
+      return false;
     }
   }
 

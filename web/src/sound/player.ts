@@ -24,7 +24,7 @@ const LOWEST = 50;
 /** Samples beyond full scale that can still be told apart, in full scales. */
 const BEYOND = 8;
 
-/** Time after which a context that does not run is taken for one that ended, ms: some pause as the tab hides. */
+/** Time after which a context that does not run has ended, ms: some pause as the tab hides. */
 const GRACE = 1000;
 
 /** Plays batches of readings as they come. Made by `startPlayer`. */
@@ -53,7 +53,7 @@ export class Player {
     };
   }
 
-  /** Whether it does not run though it should, as where a device is lost, and nobody is about to change that. */
+  /** Whether it does not run though it should and nobody is about to change that: a device is lost, say. */
   private get isOver(): boolean {
     return this.plays && this.asked === 0 && this.context.state !== "running";
   }
