@@ -121,4 +121,4 @@ def test_an_interrupt_closes_the_output_and_is_told_of_too(capsys):
         raise KeyboardInterrupt
     assert output.closed
     assert not session.followers
-    assert capsys.readouterr().err.startswith("loudspeakers: heard")
+    assert capsys.readouterr().err.startswith("loudspeakers: nothing was heard")
