@@ -41,7 +41,7 @@ from mute.support.errors import MuteError, run_cli
 from mute.support.plain_data import without_nan
 from mute.support.programs import run_program
 from mute.support.ranges import Range
-from mute.tasks import DEFAULT_TASK, make_task
+from mute.tasks import DEFAULT_TASK, PAPERS_PHASE_TERMS, QUIET_TERM_TASKS, make_task
 
 __all__ = ["ABLATIONS", "LEVERS", "PARTS", "QUIET_TERMS", "Lever", "LeversArgs", "main", "table"]
 
@@ -62,7 +62,11 @@ def _without(*terms: str) -> str:
     return " ".join(f"--env.rewards.terms.{term}.weight 0" for term in terms)
 
 
-_PAPERS_PHASE_TERMS = ("foot_drop_velocity", "foot_raise_velocity")
+def _quiet_terms(task: str) -> list[str]:
+    """Return the names of what a task scales by beta."""
+    terms = make_task(task).env.rewards.terms
+    return [name for name, term in terms.items() if term.group == "phase"]
+
 
 PARTS: Mapping[str, Lever] = {
     "recipe": Lever(),
@@ -88,10 +92,8 @@ PARTS: Mapping[str, Lever] = {
 """The recipe's parts."""
 
 ABLATIONS: Mapping[str, Lever] = {
-    "no_phase_terms": Lever(_without(*_PAPERS_PHASE_TERMS)),
-    "no_quiet_terms": Lever(
-        _without(*_PAPERS_PHASE_TERMS, "near_ground_drop", "landing_speed", "soft_steps")
-    ),
+    "no_phase_terms": Lever(_without(*PAPERS_PHASE_TERMS)),
+    "no_quiet_terms": Lever(_without(*_quiet_terms(DEFAULT_TASK))),
     "true_phase": Lever("--env.rewards.phase-source true"),
     "no_phase_in_actor": Lever("--agent.estimation.no-actor-uses-phase"),
     "no_lstm": Lever("--agent.estimation.network.encoder history"),
@@ -100,8 +102,7 @@ ABLATIONS: Mapping[str, Lever] = {
 """The paper's questions."""
 
 QUIET_TERMS: Mapping[str, Lever] = {
-    name: Lever(task=f"go1_{name}")
-    for name in ("quiet_phase", "quiet_landing_speed", "quiet_landing_load", "quiet_speed_change")
+    name.removeprefix("go1_"): Lever(task=name) for name in QUIET_TERM_TASKS
 }
 """What others are quiet by, in place of the recipe's own terms."""
 

@@ -26,16 +26,10 @@ from mute.support.errors import run_cli
 from mute.support.provenance import current_commit, machine_kind
 from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
-from mute.tasks import DEFAULT_TASK, make_task
+from mute.tasks import DEFAULT_TASK, QUIET_TERM_TASKS, make_task
 
 __all__ = ["QuietTermsArgs", "costs", "main"]
 
-_TASKS = (
-    "go1_quiet_phase",
-    "go1_quiet_landing_speed",
-    "go1_quiet_landing_load",
-    "go1_quiet_speed_change",
-)
 _SPEED = 0.5
 """Landing speed that costs are told for, m/s."""
 
@@ -118,7 +112,7 @@ def costs(policy: Policy, robots: int, seconds: float, seed: int) -> list[dict[s
             "landings": len(speeds),
             "landing speed, rms": float(speeds.square().mean().sqrt()),
         }
-        for task in _TASKS
+        for task in QUIET_TERM_TASKS
     ]
 
 
@@ -126,7 +120,7 @@ def _terms() -> dict[str, RewardTermCfg]:
     """Return the quiet terms of all tasks, each by its task and name, scaled by nothing."""
     return {
         f"{task}_{name}": dataclasses.replace(copy.deepcopy(term), group="other")
-        for task in _TASKS
+        for task in QUIET_TERM_TASKS
         for name, term in make_task(task).env.rewards.terms.items()
         if term.group == "phase" and term.weight != 0.0
     }

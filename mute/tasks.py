@@ -17,9 +17,19 @@ from mute.envs.scene import SceneCfg
 from mute.networks.estimator import EstimatorCfg
 from mute.support.errors import MuteError
 
-__all__ = ["DEFAULT_TASK", "make_task", "register_task", "task_names"]
+__all__ = [
+    "DEFAULT_TASK",
+    "PAPERS_PHASE_TERMS",
+    "QUIET_TERM_TASKS",
+    "make_task",
+    "register_task",
+    "task_names",
+]
 
 DEFAULT_TASK = "go1_mute"
+
+PAPERS_PHASE_TERMS = tuple(name for name, term in paper_terms().items() if term.group == "phase")
+"""Names of what the paper is quiet by."""
 
 
 def _go1_mute_paper() -> TaskCfg:
@@ -135,7 +145,7 @@ def _go1_dreamwaq() -> TaskCfg:
 
 def _dreamwaq_terms() -> dict[str, RewardTermCfg]:
     """Return DreamWaQ's Table I: the paper's without phase and collision, and three of its own."""
-    without = (*_PAPERS_PHASE_TERMS, "collision")
+    without = (*PAPERS_PHASE_TERMS, "collision")
     terms = {name: term for name, term in paper_terms().items() if name not in without}
     return terms | {
         "foot_clearance": reward_term("foot_clearance", -0.01, group="other"),
@@ -182,9 +192,6 @@ def _quiet() -> dict[str, RewardTermCfg]:
     }
 
 
-_PAPERS_PHASE_TERMS = ("foot_drop_velocity", "foot_raise_velocity")
-
-
 def _quiet_by(*terms: RewardTermCfg, foot_forces: bool = False) -> Callable[[], TaskCfg]:
     """Return the recipe of `go1_mute`, quiet by what others have used, in place of its own terms.
 
@@ -198,7 +205,7 @@ def _quiet_by(*terms: RewardTermCfg, foot_forces: bool = False) -> Callable[[], 
 
     def make() -> TaskCfg:
         own = {term.function: copy.deepcopy(term) for term in terms}
-        papers = {name: reward_term(name, 0.0) for name in _PAPERS_PHASE_TERMS}
+        papers = {name: reward_term(name, 0.0) for name in PAPERS_PHASE_TERMS}
         stamping = {"stamping": _quiet()["stamping"]}
         return _led_to_a_trot(papers | stamping | own, foot_forces)
 
@@ -215,19 +222,25 @@ def _upright() -> dict[str, RewardTermCfg]:
     }
 
 
-_TASKS: dict[str, Callable[[], TaskCfg]] = {
-    "go1_mute": _go1_mute,
-    "go1_mute_paper": _go1_mute_paper,
-    "go1_dreamwaq": _go1_dreamwaq,
-    # Quiet terms of the literature by the same recipe. Weights are ours: each makes a landing at
-    # 0.5 m/s cost 5 for each unit of beta on a walk of the policy that ships, by
-    # `benchmarks.quiet_terms`.
+# Weights are ours: each makes a landing at 0.5 m/s cost 5 for each unit of beta on a walk of the
+# policy that ships, by `benchmarks.quiet_terms`.
+_QUIET_TERM_TASKS: dict[str, Callable[[], TaskCfg]] = {
     "go1_quiet_phase": _quiet_by(
         reward_term("foot_drop_velocity", -4.8), reward_term("foot_raise_velocity", 0.96)
     ),
     "go1_quiet_landing_speed": _quiet_by(reward_term("landing_speed", -20.0)),
     "go1_quiet_landing_load": _quiet_by(reward_term("landing_load", -57.0), foot_forces=True),
     "go1_quiet_speed_change": _quiet_by(reward_term("foot_speed_change", -30.0)),
+}
+
+QUIET_TERM_TASKS = tuple(_QUIET_TERM_TASKS)
+"""Names of the tasks of `go1_mute`'s recipe with quiet terms of the literature."""
+
+_TASKS: dict[str, Callable[[], TaskCfg]] = {
+    "go1_mute": _go1_mute,
+    "go1_mute_paper": _go1_mute_paper,
+    "go1_dreamwaq": _go1_dreamwaq,
+    **_QUIET_TERM_TASKS,
 }
 
 

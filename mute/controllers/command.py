@@ -32,12 +32,18 @@ class Command:
 
     def changed(self, **steps: float) -> Command:
         """Return a command with steps added to its parts, held within the limits."""
-        values = {}
-        for name, step in steps.items():
+        # Rounded, so that steps of 0.1 come back to exactly 0, which asks to stand.
+        return self.with_parts(
+            **{name: round(getattr(self, name) + step, 6) for name, step in steps.items()}
+        )
+
+    def with_parts(self, **values: float) -> Command:
+        """Return a command with other parts, held within the limits."""
+        held = {}
+        for name, value in values.items():
             low, high = COMMAND_LIMITS[name]
-            # Rounded, so that steps of 0.1 come back to exactly 0, which asks to stand.
-            values[name] = min(max(round(getattr(self, name) + step, 6), low), high)
-        return replace(self, **values)
+            held[name] = min(max(value, low), high)
+        return replace(self, **held)
 
     def tensor(self) -> torch.Tensor:
         """Return (v_x, v_y, w_z, beta). Shape: (4,)."""

@@ -105,8 +105,9 @@ class Session:
         """
         controller.reset()
         self.controller = controller
-        self._begin_anew()
-        self._obedience = Obedience(self.env)
+        if self.listener is not None:
+            self.listener.begin_anew()
+        self._begin_figures()
 
     def push(self, forward: float, left: float) -> None:
         """Push all robots at once.
@@ -131,7 +132,6 @@ class Session:
         self.steps = 0
         """Control steps since the start."""
         self._begin_figures()
-        self._obedience = Obedience(self.env)
 
     def step(self) -> None:
         """Walk one control step; a robot that falls starts again with the same command."""
@@ -165,16 +165,11 @@ class Session:
         self._recent = GaitMeter(self.env, settle_time=0.0)
         return gait
 
-    def _begin_anew(self) -> None:
-        """Begin the figures anew, of robots that go on: none is of two drivers."""
-        if self.listener is not None:
-            self.listener.begin_anew()
-        self._begin_figures()
-
     def _begin_figures(self) -> None:
         self._begun = self.steps
         self._meter = GaitMeter(self.env, self._settle_time)
         self._recent = GaitMeter(self.env, settle_time=0.0)
+        self._obedience = Obedience(self.env)
 
     def _ask(self) -> None:
         """Give every robot the command, but for those that are to stand first."""

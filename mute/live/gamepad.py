@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from mute.controllers.command import Command
 from mute.evaluation.session import Session
 
 __all__ = ["GAMEPAD_HELP", "Gamepad", "GamepadSource", "PadState", "Pull", "pull", "without_slack"]
@@ -151,11 +150,10 @@ class Gamepad:
     def _drive(session: Session, asked: Pull) -> None:
         """Ask for shares of the speeds that are trained."""
         trained = session.env.cfg.commands
-        command = Command(
+        command = session.command.with_parts(
             vx=_part(asked.forward, trained.lin_vel_x),
             vy=_part(asked.left, trained.lin_vel_y),
             wz=_part(asked.turn, trained.ang_vel_z),
-            beta=session.command.beta,
         )
         if command != session.command:
             session.set_command(command)

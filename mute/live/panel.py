@@ -14,7 +14,7 @@ import viser
 from viser import uplot
 
 from mute.controllers import Controller
-from mute.controllers.command import COMMAND_LIMITS, Command
+from mute.controllers.command import COMMAND_LIMITS
 from mute.evaluation.session import Session
 
 __all__ = ["TRACE_RATE", "Choice", "Panel"]
@@ -128,14 +128,9 @@ class Panel:
         What comes from a browser may be anything: numbers that are none are left alone, and none
         goes further than a slider.
         """
-        command = Command(
-            **{
-                name: _asked(
-                    slider.value, getattr(self._session.command, name), COMMAND_LIMITS[name]
-                )
-                for name, slider in self.sliders.items()
-            }
-        )
+        asked = {name: float(slider.value) for name, slider in self.sliders.items()}
+        numbers = {name: value for name, value in asked.items() if math.isfinite(value)}
+        command = self._session.command.with_parts(**numbers)
         if command != self._session.command:
             self._session.set_command(command)
 
@@ -180,9 +175,3 @@ class Panel:
             title="level (dBA, Fast), modelled",
             aspect=1.6,
         )
-
-
-def _asked(value: float, now: float, limits: tuple[float, float]) -> float:
-    """Return what a slider asks for, within its limits; what is now, where it is no number."""
-    value = float(value)
-    return min(max(value, limits[0]), limits[1]) if math.isfinite(value) else float(now)

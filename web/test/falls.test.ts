@@ -8,23 +8,15 @@ import type { SoundSwitch } from "../src/control/sound_switch.js";
 import { KeptReadings, measure } from "../src/control/measure.js";
 import { Walk } from "../src/control/walk.js";
 import { LiveWalk } from "../src/live_walk.js";
-import { loadPhysics } from "../src/physics/mujoco.js";
 import { contactFigures } from "../src/physics/page_data.js";
-import { Simulation } from "../src/physics/simulation.js";
-import { Policy } from "../src/policy/policy.js";
+import type { Simulation } from "../src/physics/simulation.js";
 import { OfflineSound } from "../src/sound/offline.js";
 import { Playback } from "../src/sound/playback.js";
-import { asset, page, textOf } from "./files.js";
+import { page } from "./files.js";
+import { makeSimulation, policy, simulation } from "./robot.js";
 import { readTables } from "./sound/walks.js";
 
 const tables = readTables();
-const mujoco = await loadPhysics();
-const scenes = { flat: textOf(asset("flat.xml")), stairs: textOf(asset("stairs.xml")) };
-const simulation = new Simulation(mujoco, scenes, page);
-const policy = new Policy(asset("go1_mute.onnx"), {
-  jointNames: page.joint_names,
-  timestep: simulation.timestep,
-});
 
 test("a robot that falls or blows up begins anew, and is in no figure until it walks again", () => {
   // Upwards at a speed that no robot has, or into a roll that no leg holds up.
@@ -100,7 +92,7 @@ test("a measurement has nothing of a blow-up in its levels either", () => {
   simulation.reset();
   const spun = Array.from(simulation.qvel, (speed, axis) => (axis === 9 ? 1e5 : speed));
   const { pnl, mnl } = measure(
-    new Simulation(mujoco, scenes, page),
+    makeSimulation(),
     policy,
     page,
     (surface) => new OfflineSound(tables, { surface, timestep: simulation.timestep }),
@@ -117,7 +109,7 @@ test("a measurement has nothing of a blow-up in its levels either", () => {
 });
 
 test("a measurement that fails leaves no robot behind", () => {
-  const robot = new Simulation(mujoco, scenes, page);
+  const robot = makeSimulation();
   let deleted = 0;
   const free = robot.delete.bind(robot);
   robot.delete = () => {

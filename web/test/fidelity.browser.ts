@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 
 import { LONG, Site } from "./browser.js";
-import { walkOf, walks } from "./files.js";
+import { FIGURES, walkOf, walks } from "./files.js";
 import { CORES, coreTime, Machine } from "./machine.js";
 
 let site: Site;
@@ -12,16 +12,6 @@ before(async () => {
   site = await Site.open();
 });
 after(async () => site.close());
-
-const FIGURES = [
-  "speed",
-  "landing_speed_mean",
-  "landing_speed_rms",
-  "apex_mean",
-  "duty_factor",
-  "stride_frequency",
-  "power",
-] as const;
 
 // What a walk on stairs becomes hangs on whether a foot just meets an edge: it is tried in node.
 const flat = Object.entries(walks).filter(([, { terrain }]) => terrain === "flat");

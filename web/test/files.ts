@@ -47,3 +47,14 @@ export function walkOf(name: string): ReferenceWalk {
   if (!found) throw new Error(`there is no walk ${name} in walks.json`);
   return found;
 }
+
+/** Figures of a walk that the page is held to. */
+export const FIGURES = [
+  "speed",
+  "landing_speed_mean",
+  "landing_speed_rms",
+  "apex_mean",
+  "duty_factor",
+  "stride_frequency",
+  "power",
+] as const;

@@ -5,32 +5,13 @@ import { test } from "node:test";
 
 import { ReadingsBatcher } from "../src/control/hearing.js";
 import { Walk } from "../src/control/walk.js";
-import { loadPhysics } from "../src/physics/mujoco.js";
 import { contactFigures } from "../src/physics/page_data.js";
-import { Simulation } from "../src/physics/simulation.js";
-import { Policy } from "../src/policy/policy.js";
 import { OfflineSound } from "../src/sound/offline.js";
-import { asset, page, type ReferenceWalk, textOf, walks } from "./files.js";
+import { FIGURES, page, type ReferenceWalk, walks } from "./files.js";
+import { policy, simulation } from "./robot.js";
 import { readTables } from "./sound/walks.js";
 
-const FIGURES = [
-  "speed",
-  "landing_speed_mean",
-  "landing_speed_rms",
-  "apex_mean",
-  "duty_factor",
-  "stride_frequency",
-  "power",
-] as const;
-
 const tables = readTables();
-const mujoco = await loadPhysics();
-const scenes = { flat: textOf(asset("flat.xml")), stairs: textOf(asset("stairs.xml")) };
-const simulation = new Simulation(mujoco, scenes, page);
-const policy = new Policy(asset("go1_mute.onnx"), {
-  jointNames: page.joint_names,
-  timestep: simulation.timestep,
-});
 
 function begin(reference: ReferenceWalk): Walk {
   simulation.setFloor(reference.surface);
