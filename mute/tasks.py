@@ -14,6 +14,7 @@ from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
 from mute.envs.rewards import RewardsCfg, RewardTermCfg, paper_terms, reward_term
 from mute.envs.scene import SceneCfg
+from mute.envs.terrain import TerrainCfg
 from mute.networks.estimator import EstimatorCfg
 from mute.support.errors import MuteError
 
@@ -45,9 +46,27 @@ def _go1_mute_paper() -> TaskCfg:
     )
 
 
-def _go1_mute() -> TaskCfg:
+def _go1_mute_flat() -> TaskCfg:
     """Return what works on a CPU: led to a trot that goes from a stand, then paid to be soft."""
     return _led_to_a_trot(_quiet())
+
+
+def _go1_mute() -> TaskCfg:
+    """Return the recipe of flat ground, over the floors and stairs of a house."""
+    task = _go1_mute_flat()
+    # Commands that lead somewhere, as by those of two seconds nobody crosses anything.
+    task.env.terrain = TerrainCfg(
+        kind="indoor", first_levels=(0, 0), crossed=3.0, command_time=5.0, turning_share=0.2
+    )
+    # On stairs a trunk is to lie along them, not level.
+    terms = task.env.rewards.terms
+    terms["lean"] = reward_term("lean", terms.pop("tilt").weight, group="lift")
+    # Half as many steps of physics teach as well, in little more than half of the time.
+    task.env.scene = dataclasses.replace(task.env.scene, timestep=0.01)
+    task.env.decimation = 2
+    task.agent.iterations = 4000
+    task.agent.settling_share = 0.075  # as many iterations as on flat ground
+    return task
 
 
 def _led_to_a_trot(quiet: Mapping[str, RewardTermCfg], foot_forces: bool = False) -> TaskCfg:
@@ -238,6 +257,7 @@ QUIET_TERM_TASKS = tuple(_QUIET_TERM_TASKS)
 
 _TASKS: dict[str, Callable[[], TaskCfg]] = {
     "go1_mute": _go1_mute,
+    "go1_mute_flat": _go1_mute_flat,
     "go1_mute_paper": _go1_mute_paper,
     "go1_dreamwaq": _go1_dreamwaq,
     **_QUIET_TERM_TASKS,
