@@ -11,7 +11,7 @@ from typing import Any
 from mute.config import AgentCfg, EstimationCfg, PPOCfg, TaskCfg
 from mute.envs.commands import CommandsCfg
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
-from mute.envs.randomization import RandomizationCfg
+from mute.envs.randomization import RandomizationCfg, full_randomization
 from mute.envs.rewards import RewardsCfg, RewardTermCfg, paper_terms, reward_term
 from mute.envs.scene import SceneCfg
 from mute.envs.terrain import TerrainCfg
@@ -52,21 +52,30 @@ def _go1_mute_flat() -> TaskCfg:
 
 
 def _go1_mute() -> TaskCfg:
-    """Return the recipe of flat ground, over the floors and stairs of a house."""
+    """Return the recipe of flat ground, for any robot, over the floors and stairs of a house.
+
+    Physics is MuJoCo's own on every device: Warp has neither ground nor motor delays.
+    """
     task = _go1_mute_flat()
-    # Commands that lead somewhere, as by those of two seconds nobody crosses anything.
-    task.env.terrain = TerrainCfg(
-        kind="indoor", first_levels=(0, 0), crossed=3.0, command_time=5.0, turning_share=0.2
-    )
-    # On stairs a trunk is to lie along them, not level.
     terms = task.env.rewards.terms
+    # On stairs a trunk is to lie along them, not level.
     terms["lean"] = reward_term("lean", terms.pop("tilt").weight, group="lift")
-    # Half as many steps of physics teach as well, in little more than half of the time.
-    task.env.scene = dataclasses.replace(task.env.scene, timestep=0.01)
-    task.env.decimation = 2
-    task.agent.iterations = 4000
-    task.agent.settling_share = 0.075  # as many iterations as on flat ground
-    return task
+    env = dataclasses.replace(
+        task.env,
+        engine="mujoco",
+        # Half as many steps of physics teach as well, in little more than half of the time; no
+        # floor can be stiffer in them than the one of the scene.
+        scene=dataclasses.replace(task.env.scene, timestep=0.01),
+        decimation=2,
+        randomization=dataclasses.replace(full_randomization(), floor_stiffness=(0.5, 1.0)),
+        # Commands of two seconds cross nothing.
+        terrain=TerrainCfg(
+            kind="indoor", first_levels=(0, 0), crossed=3.0, command_time=5.0, turning_share=0.2
+        ),
+    )
+    # The last learning rates fall over as many iterations as on flat ground.
+    agent = dataclasses.replace(task.agent, iterations=4000, settling_share=0.06)
+    return TaskCfg(env=env, agent=agent)
 
 
 def _led_to_a_trot(quiet: Mapping[str, RewardTermCfg], foot_forces: bool = False) -> TaskCfg:
