@@ -20,6 +20,7 @@ from mute.support.errors import MuteError
 
 __all__ = [
     "DEFAULT_TASK",
+    "FLAT_TASK",
     "PAPERS_PHASE_TERMS",
     "QUIET_TERM_TASKS",
     "make_task",
@@ -28,6 +29,10 @@ __all__ = [
 ]
 
 DEFAULT_TASK = "go1_mute"
+
+FLAT_TASK = "go1_mute_flat"
+"""The recipe on flat ground, of minutes: by it parts and quiet terms are compared, and its robots
+are those of whatever drives without a task of its own."""
 
 PAPERS_PHASE_TERMS = tuple(name for name, term in paper_terms().items() if term.group == "phase")
 """Names of what the paper is quiet by."""
@@ -79,7 +84,7 @@ def _go1_mute() -> TaskCfg:
 
 
 def _led_to_a_trot(quiet: Mapping[str, RewardTermCfg], foot_forces: bool = False) -> TaskCfg:
-    """Return the recipe of `go1_mute` with some terms to be quiet by.
+    """Return the recipe of `go1_mute_flat` with some terms to be quiet by.
 
     Args:
         quiet: The terms by name; they take the places of the paper's.
@@ -221,7 +226,7 @@ def _quiet() -> dict[str, RewardTermCfg]:
 
 
 def _quiet_by(*terms: RewardTermCfg, foot_forces: bool = False) -> Callable[[], TaskCfg]:
-    """Return the recipe of `go1_mute`, quiet by what others have used, in place of its own terms.
+    """Return the recipe of `go1_mute_flat`, quiet by what others have used, in place of its own terms.
 
     What beta and its ramp scale is that alone, beside the term against stamping, without which few
     trainings walk; the paper's phase terms are left out.
@@ -262,11 +267,11 @@ _QUIET_TERM_TASKS: dict[str, Callable[[], TaskCfg]] = {
 }
 
 QUIET_TERM_TASKS = tuple(_QUIET_TERM_TASKS)
-"""Names of the tasks of `go1_mute`'s recipe with quiet terms of the literature."""
+"""Names of the tasks of `go1_mute_flat`'s recipe with quiet terms of the literature."""
 
 _TASKS: dict[str, Callable[[], TaskCfg]] = {
-    "go1_mute": _go1_mute,
-    "go1_mute_flat": _go1_mute_flat,
+    DEFAULT_TASK: _go1_mute,
+    FLAT_TASK: _go1_mute_flat,
     "go1_mute_paper": _go1_mute_paper,
     "go1_dreamwaq": _go1_dreamwaq,
     **_QUIET_TERM_TASKS,
