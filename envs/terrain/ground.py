@@ -14,7 +14,7 @@ from mute.envs.simulation import Simulation
 
 from .figures import TREAD
 from .kinds import KINDS, Kind
-from .layout import Layout
+from .layout import Layout, told_apart
 
 __all__ = ["NEAR", "BoxGround", "FlatGround", "Ground", "num_boxes"]
 
@@ -241,10 +241,11 @@ class BoxGround(Ground):
 
     def _lay(self, kind: Kind, robots: torch.Tensor, xy: torch.Tensor) -> None:
         level, dtype = self.level[robots], self._pos.dtype
-        laid = kind.lay(xy, level, self.key[robots])
+        base = kind.base(level)
+        laid = told_apart(kind.lay(xy, level, self.key[robots]), xy, base, TREAD)
         at = (robots[:, None], self._boxes[: kind.boxes])
         half = laid.half.to(dtype)
-        self._pos[robots, self._plane, 2] = kind.base(level).to(dtype)
+        self._pos[robots, self._plane, 2] = base.to(dtype)
         self._pos[at] = laid.pos.to(dtype)
         self._size[at] = half
         self._aabb[(*at, slice(3, None))] = half

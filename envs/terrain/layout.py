@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import torch
 
-__all__ = ["DEPTH", "HALF_WIDTH", "REACH", "WIDE", "Layout", "boxes", "join"]
+__all__ = ["CAP", "DEPTH", "HALF_WIDTH", "REACH", "WIDE", "Layout", "boxes", "join", "told_apart"]
 
 DEPTH = 0.3
 """How far a box reaches below the plane that all boxes stand on, m: no foot gets under one."""
@@ -17,6 +17,9 @@ all of a robot that falls within it."""
 
 HALF_WIDTH = 1.5
 """Half the width of what is endless to the sides, m; it is laid beside the robot as it walks."""
+
+CAP = 0.1
+"""How far the sphere around a box may rise above its top, m: well below a trunk that walks."""
 
 WIDE = 6.0
 """The same where ground is drawn, m."""
@@ -52,6 +55,36 @@ def boxes(
     pos = torch.stack((0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]), 0.5 * (top + bottom)), dim=-1)
     half = torch.stack((0.5 * (x[1] - x[0]), 0.5 * (y[1] - y[0]), 0.5 * (top - bottom)), dim=-1)
     return Layout(pos, half.clamp(min=1e-3), torch.zeros_like(top))
+
+
+def told_apart(layout: Layout, xy: torch.Tensor, base: torch.Tensor, step: float) -> Layout:
+    """Return the same ground by boxes that the engine can tell to be far away.
+
+    MuJoCo looks closer at a shape and a box wherever the spheres around them meet. The sphere
+    around a slab holds all of the robot above it; around a box as deep as a well it is level with
+    the top, and what is not near the ground is passed over. Boxes beyond reach then have to sink,
+    as their spheres reach far to the sides.
+
+    Args:
+        layout: Boxes around n robots.
+        xy: Where these are, m. Shape: (n, 2).
+        base: Height of the plane, m. Shape: (n,).
+        step: How far a robot gets along x or y before its boxes are laid anew, m.
+
+    Returns:
+        In double precision, as the depths are up to a thousand times the steps between boxes.
+    """
+    pos, half = layout.pos.double(), layout.half.double()
+    upright = layout.pitch == 0.0
+    top = pos[..., 2] + half[..., 2]
+    away = (xy[:, None] - pos[..., :2]).abs() - half[..., :2]
+    far = upright & (away > REACH + step).any(dim=-1)
+    deep = half[..., :2].square().sum(dim=-1) / (2.0 * CAP)
+    depth = torch.where(upright, torch.maximum(deep, half[..., 2]), half[..., 2])
+    top = torch.where(far, base[:, None].double() - 0.5 * DEPTH, top)
+    pos[..., 2] = torch.where(upright, top - depth, pos[..., 2])
+    half[..., 2] = depth
+    return Layout(pos, half, layout.pitch)
 
 
 def join(*layouts: Layout) -> Layout:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import math
 
@@ -16,6 +17,7 @@ from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
 from mute.envs.scene import FOOT_RADIUS, SceneCfg, build_scene, make_spec
 from mute.envs.terrain import GROUNDS, KINDS, BoxGround, TerrainCfg, kind_of_robot
+from mute.envs.terrain.layout import CAP, Layout
 
 
 def _env(kind: str, num_envs: int = 10, **fields) -> QuadrupedEnv:
@@ -148,6 +150,64 @@ def test_a_robot_moves_to_the_last_bit_as_in_a_model_with_its_ground_alone(kind)
         alone.step(20)
         np.testing.assert_array_equal(alone._own["qpos"][0], simulation._own["qpos"][robot])
         np.testing.assert_array_equal(alone._own["qvel"][0], simulation._own["qvel"][robot])
+
+
+def _contacts(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
+    """Return which shape of the robot touches, how deep, where, along which normal; in order."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    found = data.contact
+    shape = found.geom.max(axis=1, keepdims=True)  # the robot's, after the ground's
+    rows = np.hstack((shape, found.dist[:, None], found.pos, found.frame[:, :3])).round(6) + 0.0
+    return rows[np.lexsort(rows.T[::-1])]
+
+
+def _drawn_as(model: mujoco.MjModel, boxes: np.ndarray, laid: Layout) -> mujoco.MjModel:
+    """Return a model with boxes as a kind lays them for a picture, of one robot."""
+    model = copy.copy(model)
+    turn = 0.5 * laid.pitch[0].double().numpy()
+    model.geom_pos[boxes], model.geom_size[boxes] = laid.pos[0].numpy(), laid.half[0].numpy()
+    model.geom_rbound[boxes] = laid.half[0].norm(dim=-1).numpy()
+    model.geom_aabb[boxes, 3:] = laid.half[0].numpy()
+    model.geom_quat[boxes] = np.stack((np.cos(turn), 0 * turn, np.sin(turn), 0 * turn), axis=-1)
+    return model
+
+
+@pytest.mark.parametrize("kind", [name for name in KINDS if name != "flat"])
+def test_a_robot_that_comes_down_on_what_is_laid_touches_what_is_drawn(kind):
+    env, draws = _env(kind, 10), np.random.default_rng(0)
+    ground, qpos = _ground(env), env.simulation.qpos
+    ground.level[:] = torch.arange(10) % 5
+    qpos[:, :2] = 3.0 + 2.0 * torch.rand(10, 2, generator=torch.Generator().manual_seed(4))
+    ground.lay(qpos[:, :2], torch.ones(10, dtype=torch.bool))
+    boxes, shapes = ground._boxes[: KINDS[kind].boxes].numpy(), set()
+    for robot in range(10):
+        own = slice(robot, robot + 1)
+        laid = KINDS[kind].lay(qpos[own, :2], ground.level[own], ground.key[own])
+        model = _model_of_its_own(env, robot)
+        drawn = _drawn_as(model, boxes, laid)
+        pose = qpos[robot].double().numpy().copy()
+        if robot % 2:
+            pose[3:7] = draws.normal(size=4)  # as one who has fallen
+            pose[3:7] /= np.linalg.norm(pose[3:7])
+        found = np.empty((0, 8))
+        for pose[2] in np.arange(1.5, -1.5, -0.005):
+            found = _contacts(model, pose)
+            if len(found):
+                break
+        assert len(found)
+        np.testing.assert_allclose(found, _contacts(drawn, pose), atol=3e-6)
+        shapes |= set(found[:, 0])
+    assert len(shapes) > 4  # not the feet alone
+
+
+def test_the_sphere_around_what_is_laid_ends_close_above_it():
+    env = _env("stairs", 5)
+    ids = _ground(env)._boxes
+    size = env.simulation.field("geom_size")[:, ids]
+    over = env.simulation.field("geom_rbound")[:, ids] - size[..., 2]
+    assert float(over.max()) <= CAP
 
 
 @pytest.mark.parametrize("kind", ["indoor", "rough"])
