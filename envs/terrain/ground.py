@@ -190,7 +190,8 @@ class BoxGround(Ground):
             level, key, kind = level[robots], key[robots], self.kind[robots]
             rows_of_kind = [torch.nonzero(kind == index)[:, 0] for index in range(len(self.kinds))]
         for name, rows in zip(self.kinds, rows_of_kind, strict=True):
-            heights[rows] = KINDS[name].height(flat[rows], level[rows], key[rows])
+            if len(rows):
+                heights[rows] = KINDS[name].height(flat[rows], level[rows], key[rows])
         return heights.reshape(points.shape[:-1])
 
     def heading(self, draw: torch.Tensor) -> torch.Tensor:

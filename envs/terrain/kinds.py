@@ -288,10 +288,18 @@ class Rooms(Kind):
 
     def height(self, xy: torch.Tensor, level: torch.Tensor, key: torch.Tensor) -> torch.Tensor:
         """Return the height of what lies below each point, see `Kind.height`."""
-        cell = torch.floor(xy[..., 0] / self._CELL + 0.5).long()
+        x = xy[..., 0].contiguous()
+        # What lies in the few cells that a robot's points are in is looked up once for all of them.
+        first, last = (torch.floor(end / self._CELL + 0.5).long() for end in (x.amin(1), x.amax(1)))
+        count = int((last - first).max()) + 1
+        cell = first[:, None] + torch.arange(count, device=x.device)
         half, rise = self._thing(cell, level, key)
-        inside = (xy[..., 0] - cell * self._CELL).abs() <= half
-        return torch.where(inside, rise, 0.0).amax(dim=0)
+        height = torch.zeros_like(x)
+        for i in range(count):
+            away = (x - cell[:, i, None] * self._CELL).abs()
+            for its_half, its_rise in zip(half[..., i, None], rise[..., i, None], strict=True):
+                torch.maximum(height, (away <= its_half) * its_rise, out=height)
+        return height
 
     def lay(
         self, xy: torch.Tensor, level: torch.Tensor, key: torch.Tensor, wide: bool = False

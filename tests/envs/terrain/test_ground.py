@@ -236,6 +236,16 @@ def test_heights_around_a_robot_are_those_of_its_ground():
     assert (heights.amax(dim=1) - heights.amin(dim=1)).diff().min() > 0.0
 
 
+def test_heights_are_told_of_some_robots_alone():
+    env = _env("indoor", 12)
+    generator = torch.Generator().manual_seed(0)
+    points = 20.0 * torch.rand(12, 30, 2, generator=generator)
+    whole = env.ground.height(points)
+    for some in ([3, 1, 8], [0]):
+        robots = torch.tensor(some, dtype=torch.long)
+        assert torch.equal(env.ground.height(points[robots], robots), whole[robots])
+
+
 @pytest.mark.parametrize("name", GROUNDS)
 def test_kinds_are_shared_out_as_the_table_says(name):
     cfg = TerrainCfg(kind=name)
