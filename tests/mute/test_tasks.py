@@ -11,7 +11,6 @@ import pytest
 from mute import tasks
 from mute.config import TaskCfg
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
-from mute.envs.randomization import full_randomization
 from mute.support.errors import MuteError
 from mute.tasks import DEFAULT_TASK, FLAT_TASK, make_task, register_task, task_names
 
@@ -64,7 +63,7 @@ def test_the_default_task_is_the_flat_recipe_for_any_robot_indoors():
     flat, indoor = make_task(FLAT_TASK), make_task(DEFAULT_TASK)
     assert (flat.env.terrain.kind, indoor.env.terrain.kind) == ("flat", "indoor")
     assert indoor.env.step_dt == flat.env.step_dt
-    assert indoor.env.randomization.added_mass == full_randomization().added_mass
+    assert indoor.env.randomization.floor_stiffness == (0.5, 1.0)
     ours, theirs = indoor.env.rewards.terms, flat.env.rewards.terms
     assert ours.keys() ^ theirs.keys() == {"lean", "tilt"}
     assert all(ours[name] == theirs[name] for name in ours.keys() & theirs.keys())
