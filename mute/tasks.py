@@ -21,6 +21,7 @@ from mute.support.errors import MuteError
 __all__ = [
     "DEFAULT_TASK",
     "FLAT_TASK",
+    "INDOOR_TASK",
     "PAPERS_PHASE_TERMS",
     "QUIET_TERM_TASKS",
     "make_task",
@@ -33,6 +34,10 @@ DEFAULT_TASK = "go1_mute"
 FLAT_TASK = "go1_mute_flat"
 """The recipe on flat ground, of minutes: by it parts and quiet terms are compared, and its robots
 are those of whatever drives without a task of its own."""
+
+INDOOR_TASK = "go1_mute_indoor"
+"""The recipe over the floors and stairs of a house, of hours. It is to be the default once a policy
+that it has trained ships; until then that is the flat one."""
 
 PAPERS_PHASE_TERMS = tuple(name for name, term in paper_terms().items() if term.group == "phase")
 """Names of what the paper is quiet by."""
@@ -56,7 +61,7 @@ def _go1_mute_flat() -> TaskCfg:
     return _led_to_a_trot(_quiet())
 
 
-def _go1_mute() -> TaskCfg:
+def _go1_mute_indoor() -> TaskCfg:
     """Return the recipe of flat ground, over the floors and stairs of a house.
 
     Physics is MuJoCo's own on every device: Warp has flat ground alone.
@@ -228,7 +233,7 @@ def _quiet() -> dict[str, RewardTermCfg]:
 
 
 def _quiet_by(*terms: RewardTermCfg, foot_forces: bool = False) -> Callable[[], TaskCfg]:
-    """Return the recipe of `go1_mute_flat`, quiet by what others have used, in place of its own terms.
+    """Return the recipe of `go1_mute_flat`, quiet by what others have used, not its own terms.
 
     What beta and its ramp scale is that alone, beside the term against stamping, without which few
     trainings walk; the paper's phase terms are left out.
@@ -272,8 +277,9 @@ QUIET_TERM_TASKS = tuple(_QUIET_TERM_TASKS)
 """Names of the tasks of `go1_mute_flat`'s recipe with quiet terms of the literature."""
 
 _TASKS: dict[str, Callable[[], TaskCfg]] = {
-    DEFAULT_TASK: _go1_mute,
+    DEFAULT_TASK: _go1_mute_flat,
     FLAT_TASK: _go1_mute_flat,
+    INDOOR_TASK: _go1_mute_indoor,
     "go1_mute_paper": _go1_mute_paper,
     "go1_dreamwaq": _go1_dreamwaq,
     **_QUIET_TERM_TASKS,

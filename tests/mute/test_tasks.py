@@ -12,7 +12,7 @@ from mute import tasks
 from mute.config import TaskCfg
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.support.errors import MuteError
-from mute.tasks import DEFAULT_TASK, FLAT_TASK, make_task, register_task, task_names
+from mute.tasks import DEFAULT_TASK, FLAT_TASK, INDOOR_TASK, make_task, register_task, task_names
 
 TABLE_I = {
     "lin_vel_tracking": 1.0,
@@ -59,8 +59,8 @@ def test_the_default_task_asks_for_more_lift_than_the_papers():
     assert rewards.terms.keys() & {"touchdown_apex", "foot_clearance"}
 
 
-def test_the_default_task_is_the_flat_recipe_for_any_robot_indoors():
-    flat, indoor = make_task(FLAT_TASK), make_task(DEFAULT_TASK)
+def test_the_recipe_indoors_is_the_flat_one_over_ground():
+    flat, indoor = make_task(FLAT_TASK), make_task(INDOOR_TASK)
     assert (flat.env.terrain.kind, indoor.env.terrain.kind) == ("flat", "indoor")
     assert indoor.env.step_dt == flat.env.step_dt
     assert indoor.env.randomization.floor_stiffness == (0.5, 1.0)
