@@ -154,7 +154,7 @@ def _parts(args: argparse.Namespace, folder: Path) -> list[Part]:
     runs = folder / "runs"
     engines = ["--num-envs", "8", "--steps", "10"] if tiny else []
     training = [
-        *(python, "-m", "benchmarks.gpu_training", "--task", "go1_mute", "--device", device),
+        *(python, "-m", "benchmarks.gpu_training", "--task", "go1_mute_flat", "--device", device),
         *("--num-envs", str(robots), "--iterations", str(iterations), "--plain"),
         *("--log-dir", str(runs), "--run-name", "gpu"),
     ]

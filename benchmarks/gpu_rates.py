@@ -18,7 +18,7 @@ from mute.command_lines.benchmark_peers import ITSELF, PeerRate, peer_pythons, t
 from mute.support.errors import run_cli
 from mute.support.plain_data import without_nan
 from mute.support.ranges import Range
-from mute.tasks import DEFAULT_TASK
+from mute.tasks import FLAT_TASK
 
 from .gpu_memory import memory_in_use
 
@@ -65,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(json.dumps(without_nan(content)), flush=True)
 
     rates = time_peers(
-        names, pythons, args.num_envs, args.rounds, DEFAULT_TASK, device=args.device,
+        names, pythons, args.num_envs, args.rounds, FLAT_TASK, device=args.device,
         after_round=after_round,
     )  # fmt: skip
     return int(next(rate for rate in rates if rate.name == ITSELF).loop is None)

@@ -41,7 +41,7 @@ from mute.support.errors import MuteError, run_cli
 from mute.support.plain_data import without_nan
 from mute.support.programs import run_program
 from mute.support.ranges import Range
-from mute.tasks import DEFAULT_TASK, PAPERS_PHASE_TERMS, QUIET_TERM_TASKS, make_task
+from mute.tasks import FLAT_TASK, PAPERS_PHASE_TERMS, QUIET_TERM_TASKS, make_task
 
 __all__ = ["ABLATIONS", "LEVERS", "PARTS", "QUIET_TERMS", "Lever", "LeversArgs", "main", "table"]
 
@@ -54,7 +54,7 @@ class Lever:
 
     flags: str = ""
     """Flags of `train.py`."""
-    task: str = DEFAULT_TASK
+    task: str = FLAT_TASK
     """The task that they change."""
 
 
@@ -93,7 +93,7 @@ PARTS: Mapping[str, Lever] = {
 
 ABLATIONS: Mapping[str, Lever] = {
     "no_phase_terms": Lever(_without(*PAPERS_PHASE_TERMS)),
-    "no_quiet_terms": Lever(_without(*_quiet_terms(DEFAULT_TASK))),
+    "no_quiet_terms": Lever(_without(*_quiet_terms(FLAT_TASK))),
     "true_phase": Lever("--env.rewards.phase-source true"),
     "no_phase_in_actor": Lever("--agent.estimation.no-actor-uses-phase"),
     "no_lstm": Lever("--agent.estimation.network.encoder history"),

@@ -30,7 +30,7 @@ from mute.support.errors import MuteError, run_cli
 from mute.support.plain_data import without_nan
 from mute.support.provenance import machine_kind
 from mute.support.ranges import Range
-from mute.tasks import DEFAULT_TASK
+from mute.tasks import FLAT_TASK
 
 __all__ = ["PeerWalk", "PeerWalksArgs", "Trial", "main", "train_until_walking"]
 
@@ -191,7 +191,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             if args.out is not None:
                 write_json(args.out, content)
 
-        peer = Peer(name, pythons[name], args.num_envs, DEFAULT_TASK)
+        peer = Peer(name, pythons[name], args.num_envs, FLAT_TASK)
         try:
             keep(train_until_walking(peer, args, keep))
         finally:

@@ -143,6 +143,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "task": policy.task,
         "machine": machine_kind(),
         "options": spelled(args, ("policy", "num_envs", "turns")),
+        "timestep": policy.cfg.env.scene.timestep,
         "num_envs": args.num_envs,
         "turns": args.turns,
         "rates": _measure(policy, args),

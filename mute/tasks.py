@@ -14,11 +14,14 @@ from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
 from mute.envs.rewards import RewardsCfg, RewardTermCfg, paper_terms, reward_term
 from mute.envs.scene import SceneCfg
+from mute.envs.terrain import TerrainCfg
 from mute.networks.estimator import EstimatorCfg
 from mute.support.errors import MuteError
 
 __all__ = [
     "DEFAULT_TASK",
+    "FLAT_TASK",
+    "INDOOR_TASK",
     "PAPERS_PHASE_TERMS",
     "QUIET_TERM_TASKS",
     "make_task",
@@ -27,6 +30,14 @@ __all__ = [
 ]
 
 DEFAULT_TASK = "go1_mute"
+
+FLAT_TASK = "go1_mute_flat"
+"""The recipe on flat ground, of minutes: by it parts and quiet terms are compared, and its robots
+are those of whatever drives without a task of its own."""
+
+INDOOR_TASK = "go1_mute_indoor"
+"""The recipe over the floors and stairs of a house, of hours. It is to be the default once a policy
+that it has trained ships; until then that is the flat one."""
 
 PAPERS_PHASE_TERMS = tuple(name for name, term in paper_terms().items() if term.group == "phase")
 """Names of what the paper is quiet by."""
@@ -45,13 +56,42 @@ def _go1_mute_paper() -> TaskCfg:
     )
 
 
-def _go1_mute() -> TaskCfg:
+def _go1_mute_flat() -> TaskCfg:
     """Return what works on a CPU: led to a trot that goes from a stand, then paid to be soft."""
     return _led_to_a_trot(_quiet())
 
 
+def _go1_mute_indoor() -> TaskCfg:
+    """Return the recipe of flat ground, over the floors and stairs of a house.
+
+    Physics is MuJoCo's own on every device: Warp has flat ground alone.
+    """
+    task = _go1_mute_flat()
+    terms = task.env.rewards.terms
+    # On stairs a trunk is to lie along them, not level.
+    terms["lean"] = reward_term("lean", terms.pop("tilt").weight, group="lift")
+    env = dataclasses.replace(
+        task.env,
+        # Ground is learnt aloud: with the times of flat ground, robots climb no stairs.
+        rewards=dataclasses.replace(task.env.rewards, quiet_ramp=(300.0, 800.0)),
+        engine="mujoco",
+        # Half as many steps of physics teach as well, in little more than half of the time; no
+        # floor can be stiffer in them than the one of the scene.
+        scene=dataclasses.replace(task.env.scene, timestep=0.01),
+        decimation=2,
+        randomization=dataclasses.replace(task.env.randomization, floor_stiffness=(0.5, 1.0)),
+        # Commands of two seconds cross nothing.
+        terrain=TerrainCfg(
+            kind="indoor", first_levels=(0, 0), crossed=3.0, command_time=5.0, turning_share=0.2
+        ),
+    )
+    # The last learning rates fall over as many iterations as on flat ground.
+    agent = dataclasses.replace(task.agent, iterations=3000, settling_share=0.075)
+    return TaskCfg(env=env, agent=agent)
+
+
 def _led_to_a_trot(quiet: Mapping[str, RewardTermCfg], foot_forces: bool = False) -> TaskCfg:
-    """Return the recipe of `go1_mute` with some terms to be quiet by.
+    """Return the recipe of `go1_mute_flat` with some terms to be quiet by.
 
     Args:
         quiet: The terms by name; they take the places of the paper's.
@@ -193,7 +233,7 @@ def _quiet() -> dict[str, RewardTermCfg]:
 
 
 def _quiet_by(*terms: RewardTermCfg, foot_forces: bool = False) -> Callable[[], TaskCfg]:
-    """Return the recipe of `go1_mute`, quiet by what others have used, in place of its own terms.
+    """Return the recipe of `go1_mute_flat`, quiet by what others have used, not its own terms.
 
     What beta and its ramp scale is that alone, beside the term against stamping, without which few
     trainings walk; the paper's phase terms are left out.
@@ -234,10 +274,12 @@ _QUIET_TERM_TASKS: dict[str, Callable[[], TaskCfg]] = {
 }
 
 QUIET_TERM_TASKS = tuple(_QUIET_TERM_TASKS)
-"""Names of the tasks of `go1_mute`'s recipe with quiet terms of the literature."""
+"""Names of the tasks of `go1_mute_flat`'s recipe with quiet terms of the literature."""
 
 _TASKS: dict[str, Callable[[], TaskCfg]] = {
-    "go1_mute": _go1_mute,
+    DEFAULT_TASK: _go1_mute_flat,
+    FLAT_TASK: _go1_mute_flat,
+    INDOOR_TASK: _go1_mute_indoor,
     "go1_mute_paper": _go1_mute_paper,
     "go1_dreamwaq": _go1_dreamwaq,
     **_QUIET_TERM_TASKS,

@@ -13,7 +13,7 @@ from .kinds import KINDS
 __all__ = ["GROUNDS", "TerrainCfg", "kind_of_robot"]
 
 GROUNDS: Mapping[str, Mapping[str, float]] = {
-    "indoor": {"flat": 0.3, "rooms": 0.3, "stairs": 0.25, "stairs_down": 0.15},
+    "indoor": {"flat": 0.25, "rooms": 0.25, "blocks": 0.15, "stairs": 0.2, "stairs_down": 0.15},
     "rough": {
         "flat": 0.1,
         "slopes": 0.1,

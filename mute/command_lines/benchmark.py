@@ -76,7 +76,7 @@ from mute.evaluation.tables import print_table, write_json
 from mute.support.errors import MuteError
 from mute.support.provenance import machine_kind
 from mute.support.ranges import Range
-from mute.tasks import DEFAULT_TASK, make_task
+from mute.tasks import FLAT_TASK, make_task
 
 __all__ = ["BenchmarkArgs", "main"]
 
@@ -85,7 +85,7 @@ __all__ = ["BenchmarkArgs", "main"]
 class BenchmarkArgs:
     """Arguments of the benchmark."""
 
-    task: str = DEFAULT_TASK
+    task: str = FLAT_TASK
     """Task to measure; `module:task` imports a module of yours first, which registers it."""
     num_envs: tuple[int, ...] = (1024, 4096)
     """Numbers of environments."""

@@ -6,7 +6,7 @@ page names the command. What stands where is `card_results`' and `card_benchmark
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,18 +17,18 @@ from mute.command_lines.arguments import command_line, make_directory, parse
 from mute.command_lines.calibrate import REFERENCES
 from mute.command_lines.card_benchmark import BenchmarkFiles, benchmark_page
 from mute.command_lines.card_mpc import mpc_figures
-from mute.command_lines.card_reliability import SeedFiles, read_seeds
 from mute.command_lines.card_results import ResultFiles, results_page
 from mute.command_lines.card_sound import predicted_and_measured
 from mute.command_lines.card_tables import with_part
 from mute.command_lines.card_terrain import terrain_figures, terrain_speed
+from mute.command_lines.card_trainings import read_recipe
 from mute.evaluation.paper_levels import PAPER_LEVELS
 from mute.evaluation.tables import read_json
 from mute.support.errors import MuteError
 from mute.support.files import write_file
 from mute.support.provenance import REPOSITORY, file_sha256
 from mute.support.resources import RESOURCES
-from mute.tasks import DEFAULT_TASK
+from mute.tasks import DEFAULT_TASK, FLAT_TASK
 
 __all__ = ["CardArgs", "main", "read_benchmarks", "read_results"]
 
@@ -41,14 +41,17 @@ class CardArgs:
 
     card: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.json"
     """Card of the policy, that `mute.release` wrote."""
+    flat_card: Path = RESOURCES / "go1" / f"{FLAT_TASK}.json"
+    """Card of the policy of flat ground alone, likewise."""
     noise: Path = _DOCS / "noise" / "noise.json"
     """File that `evaluate.py noise` wrote; those of the sweeps and of the walk lie beside it."""
     reliability: Path = _DOCS / "reliability"
-    """Directory of what `evaluate.py reliability` wrote of several seeds, as seed0.json, seed1.json
-    and so on, with what `evaluate.py progress` wrote of each as seed0_progress.json, and
-    `evaluate.py gait` as seed0_gait.json."""
+    """Directory with one for each task, of what `evaluate.py reliability` wrote of several seeds,
+    as seed0.json, seed1.json and so on, with what `evaluate.py progress` wrote of each as
+    seed0_progress.json, and `evaluate.py gait` as seed0_gait.json."""
     terrain: Path = _DOCS / "terrain" / "terrain.json"
-    """File that `evaluate.py terrain` wrote; speed.json of `benchmarks.terrain` lies beside it."""
+    """File that `evaluate.py terrain` wrote; speed.json of `benchmarks.terrain` lies beside it, and
+    what the first wrote of several trainings, as seed0.json, seed1.json and so on."""
     mpc: Path = _DOCS / "mpc"
     """Directory of what `evaluate.py reliability` and `noise` wrote with --controller mpc, and
     speed.json of `benchmarks.mpc`."""
@@ -96,8 +99,10 @@ def _terrain_page(path: Path) -> str:
     Raises:
         MuteError: If a file is missing.
     """
-    page = with_part(_page("terrain.md"), "figures", terrain_figures(_read(path)))
-    speed = _read(path.parent / "speed.json", "rates", "options", "num_envs", "turns", "machine")
+    seeds = [_read(each, "figures", "trained_seed") for each in path.parent.glob("seed*.json")]
+    seeds.sort(key=lambda each: each["trained_seed"])
+    page = with_part(_page("terrain.md"), "figures", terrain_figures(_read(path, "options"), seeds))
+    speed = _read(path.parent / "speed.json", *_SPEED)
     return with_part(page, "speed", terrain_speed(speed))
 
 
@@ -120,12 +125,10 @@ def read_results(args: CardArgs) -> ResultFiles:
         MuteError: If one is missing, or not what the command wrote.
     """
     beside = args.noise.parent
-    card = _read(args.card, *_CARD)
-    seeds = read_seeds(args.reliability)
-    _check_trainings(args.reliability, card, seeds)
+    flat = args.reliability / FLAT_TASK
     return ResultFiles(
-        card=card,
-        seeds=seeds,
+        ships=read_recipe(DEFAULT_TASK, args.card, args.reliability / DEFAULT_TASK),
+        flat=read_recipe(FLAT_TASK, args.flat_card, flat) if flat.is_dir() else None,
         paper_task=_read(_DOCS / "go1_mute_paper.json"),
         noise=_read_rows(args.noise, *_LEVELS, *(f"laeq_{name}" for name in SOURCES)),
         sweep_speed=_read_rows(beside / "sweep_speed.json", *_LEVELS),
@@ -136,44 +139,11 @@ def read_results(args: CardArgs) -> ResultFiles:
     )
 
 
+_SPEED = ("rates", "options", "num_envs", "turns", "timestep", "machine")
+"""What the page on ground tells of speed."""
 _LEVELS = ("robots", "surface", "beta", "mnl_mean", "mnl_ci95", "pnl_mean", "pnl_ci95")
 _WALK = ("beta", "arrived", "mnl_mean", "mnl_ci95", "pnl_mean", "pnl_ci95")
 """What the pages tell of levels."""
-_CARD = (
-    "seed",
-    "figures",
-    "command",
-    "commit",
-    "machine",
-    "iterations",
-    "steps",
-    "wall_time_minutes",
-)
-"""What the page tells of the policy that ships."""
-
-
-def _check_trainings(folder: Path, card: Mapping[str, Any], seeds: Mapping[int, SeedFiles]) -> None:
-    """Refuse trainings that what ships is not one of, or that are not alike.
-
-    Raises:
-        MuteError: If the files of one are missing, or tell of other iterations or betas.
-    """
-    if card["seed"] not in seeds:
-        raise MuteError(f"no seed{card['seed']}.json, of what ships, in {folder}")
-    betas = [row["beta"] for row in card["figures"]["range"]]
-    for seed, run in seeds.items():
-        path = folder / f"seed{seed}_gait.json"
-        if run.gait is None:
-            raise MuteError(f"no file at {path}; `evaluate.py gait` writes it")
-        trained = run.gait.get("iteration")
-        if trained != card["iterations"] - 1:
-            raise MuteError(
-                f"{path} is of iteration {trained}, what ships of {card['iterations'] - 1}"
-            )
-        for part in ("range", "at_speed"):
-            told = [row["beta"] for row in run.gait[part]]
-            if told != betas:
-                raise MuteError(f"{path} has betas {told} in {part}, what ships has {betas}")
 
 
 def _page(name: str) -> str:

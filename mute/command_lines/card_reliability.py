@@ -14,7 +14,7 @@ from mute.evaluation.reliability.figures import Figure, Target, shown
 from mute.evaluation.tables import read_json
 from mute.support.errors import MuteError
 
-__all__ = ["TRAINING", "SeedFiles", "median_seed", "read_seeds", "reliability_section", "unmet"]
+__all__ = ["SeedFiles", "median_seed", "read_seeds", "reliability_section", "unmet"]
 
 _COLUMNS = {
     "part": ("part", "{}"),
@@ -25,8 +25,6 @@ _COLUMNS = {
     "target": ("target", "{}"),
     "met": ("met by", "{}"),
 }
-TRAINING = "python train.py --task go1_mute --seed SEED --agent.save-interval 10"
-"""How each seed is trained: checkpoints often enough to tell when it walks for the first time."""
 _WALKS = Target(at_most=3.0)
 """Steps within which a training must walk, millions."""
 
@@ -123,11 +121,13 @@ def _slower(run: SeedFiles) -> float:
     return -math.inf if figure is None or _missing(figure["value"]) else figure["value"]
 
 
-def reliability_section(seeds: Mapping[int, SeedFiles]) -> str:
+def reliability_section(seeds: Mapping[int, SeedFiles], training: str, folder: str) -> str:
     """Return the section: mean, smallest and largest of every figure, and who meets its target.
 
     Args:
         seeds: Files of one seed or more, as `read_seeds` returns them.
+        training: Command that each was trained by.
+        folder: Where the files are kept.
     """
     runs = list(seeds.values())
     robots = runs[0].reliability["robots"]
@@ -135,11 +135,10 @@ def reliability_section(seeds: Mapping[int, SeedFiles]) -> str:
     figures = [run.figures for run in runs]
     rows = [_row([each[name] for each in figures]) for name in figures[0]]
     return (
-        "## Whether one can rely on it\n\n"
         f"{markdown(rows, _COLUMNS)}\n\n"
-        f"Over the seeds {names}, each `{TRAINING}`, then `python evaluate.py reliability` with "
+        f"Over the seeds {names}, each `{training}`, then `python evaluate.py reliability` with "
         f"{robots} robots, and `python evaluate.py progress "
-        "--randomized` (`docs/reliability/`). Unlike elsewhere on this page, robots here have "
+        f"--randomized` (`{folder}/`). Unlike elsewhere on this page, robots here have "
         "randomised physics and noisy sensors, unless the figure says else. What one seed never "
         "reached has no mean: never. Where a figure could not be had of a seed, as one at a speed "
         "that it does not reach, the mean is of the others. What each figure is, is in "

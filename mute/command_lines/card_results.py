@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mute.command_lines.card_reliability import TRAINING, SeedFiles, reliability_section, unmet
+from mute.command_lines.card_reliability import reliability_section, unmet
 from mute.command_lines.card_tables import (
     markdown,
     mean_and_spread,
@@ -18,28 +18,12 @@ from mute.command_lines.card_tables import (
     times,
     usual_rows,
 )
+from mute.command_lines.card_trainings import Recipe, ends, policy_figures, trainings_table
 from mute.evaluation.matched_speed import level_at_speed
 from mute.evaluation.paper_levels import PAPER_LEVELS
 
 __all__ = ["ResultFiles", "results_page", "summary"]
 
-_RANGE = {
-    "beta": ("beta", "{:g}"),
-    "fall_rate": ("falls", "{:.1%}"),
-    "velocity_error_sq": ("velocity error (m/s)²", "{:.4f}"),
-    "velocity_rmse": ("estimator: velocity RMSE (m/s)", "{:.3f}"),
-    "height_rmse": ("height RMSE (m)", "{:.4f}"),
-    "phase_mae": ("phase MAE", "{:.3f}"),
-}
-_AT_SPEED = {
-    "beta": ("beta", "{:g}"),
-    "landing_speed_mean": ("landing speed (m/s)", "{:.3f}"),
-    "landing_speed_rms": ("its RMS", "{:.3f}"),
-    "apex_cm": ("apex (cm)", "{:.1f}"),
-    "duty_factor": ("duty factor", "{:.2f}"),
-    "stride_frequency": ("strides/s a foot", "{:.2f}"),
-    "power": ("power, control steps (W)", "{:.1f}"),
-}
 _NOISE = {
     "surface": ("floor", "{}"),
     "beta": ("beta", "{:g}"),
@@ -71,14 +55,6 @@ _SUMMARY = {
     "apex": ("feet lifted (cm)", "{}"),
     "level": ("level on wood (dBA)", "{}"),
 }
-_TRAININGS = {
-    "name": ("training", "{}"),
-    "trials": ("trials", "{}"),
-    "error": ("velocity error at beta 0, 1", "{}"),
-    "landing": ("landing speed at beta 0 to 1 (m/s)", "{}"),
-    "slower": ("beta 1 lands slower by", "{:.0%}"),
-    "apex": ("apex at beta 0, 1 (cm)", "{}"),
-}
 _TASKS = {
     "name": ("task", "{}"),
     "trained": ("trained for", "{}"),
@@ -94,10 +70,10 @@ _TASKS = {
 class ResultFiles:
     """What the files hold, as plain data."""
 
-    card: Mapping[str, Any]
-    """Of the policy that ships, with its figures."""
-    seeds: Mapping[int, SeedFiles]
-    """Of trainings of the one recipe by their seeds, that of the policy that ships among them."""
+    ships: Recipe
+    """The recipe of the policy that ships."""
+    flat: Recipe | None
+    """That of flat ground alone, where it is another."""
     paper_task: Mapping[str, Any]
     """Figures of the paper's own task, after a short training."""
     noise: Sequence[Mapping[str, Any]]
@@ -109,21 +85,17 @@ class ResultFiles:
     calibration: str
     """SHA-256 of the file of that fit."""
 
-    @property
-    def gaits(self) -> dict[int, Mapping[str, Any]]:
-        """What `evaluate.py gait` wrote of every training, by its seed."""
-        return {seed: run.gait for seed, run in self.seeds.items() if run.gait is not None}
-
 
 def results_page(files: ResultFiles) -> str:
     """Return the whole page."""
     sections = (
         _head(),
-        f"## Over {len(files.gaits)} trainings\n\n{summary(files)}",
-        _trainings(files),
-        reliability_section(files.seeds),
-        _policy(files),
+        f"## Over {len(files.ships.gaits)} trainings\n\n{summary(files)}",
+        trainings_table(files.ships),
+        f"## Whether one can rely on it\n\n{_reliability(files.ships)}",
+        f"## The policy that ships\n\n{policy_figures(files.ships)}",
         _noise(files),
+        *_flat(files),
         _paper_task(files),
         _shortcomings(files),
     )
@@ -132,7 +104,7 @@ def results_page(files: ResultFiles) -> str:
 
 def summary(files: ResultFiles) -> str:
     """Return the table that also stands on the front page, and what it is of."""
-    runs = list(files.gaits.values())
+    runs = list(files.ships.gaits.values())
     robots = sum(run["trials"] for run in runs)
     levels = {row["beta"]: row for row in usual_rows(files.noise) if row["surface"] == "wood"}
     rows = []
@@ -152,12 +124,12 @@ def summary(files: ResultFiles) -> str:
                 "level": spread_of_trials(levels[beta], "mnl") if beta in levels else None,
             }
         )
-    seeds = ", ".join(map(str, files.gaits))
+    seeds = ", ".join(map(str, files.ships.gaits))
     loud, quiet = (PAPER_LEVELS[f"mute beta {beta}"]["wood"][0] for beta in (0, 1))
     return (
         f"{markdown(rows, _SUMMARY)}\n\n"
         f"Mean ± standard deviation over {len(runs)} trainings, seeds {seeds}, of "
-        f"{files.card['iterations']} iterations. Landing speed and lift are at an *actual* "
+        f"{files.ships.card['iterations']} iterations. Landing speed and lift are at an *actual* "
         "0.5 m/s. The level is the policy's that ships, asked for 0.5 m/s, over "
         f"{levels[0.0]['trials']} trials: modelled; of the real robot the paper measured "
         f"{loud:.1f} dBA at beta 0 and {quiet:.1f} at beta 1. One figure of the model is fitted, "
@@ -178,69 +150,22 @@ def _head() -> str:
     )
 
 
-def _trainings(files: ResultFiles) -> str:
-    rows = []
-    for seed, run in files.gaits.items():
-        landing = [row["landing_speed_mean"] for row in run["at_speed"]]
-        rows.append(
-            {
-                "name": f"seed {seed}{' (ships)' if seed == files.card['seed'] else ''}",
-                "trials": f"{run['trials']} of {run['seconds']:g} s",
-                "error": _ends(run["range"], "velocity_error_sq", "{:.3f}"),
-                "landing": ", ".join(f"{value:.3f}" for value in landing),
-                "slower": 1.0 - landing[-1] / landing[0],
-                "apex": _ends(run["at_speed"], "apex_mean", "{:.1f}", 100.0),
-            }
-        )
-    slower = [row["slower"] for row in rows]
-    return (
-        f"{markdown(rows, _TRAININGS)}\n\n"
-        f"Each is `{TRAINING}` to its end, then `python "
-        "evaluate.py gait --policy FILE` (`docs/reliability/`). Landing speeds "
-        f"are at an actual 0.5 m/s. Beta 1 lands slower than beta 0 by {min(slower):.0%} to "
-        f"{max(slower):.0%}. How a run goes differs with the seed, and with the commit and the "
-        "kind of processor, since rounding does. Other recipes are in [recipes.md](recipes.md)."
-    )
+def _reliability(recipe: Recipe) -> str:
+    return reliability_section(recipe.seeds, recipe.training, recipe.folder)
 
 
-def _policy(files: ResultFiles) -> str:
-    card, figures = files.card, files.card["figures"]
-    in_cm = [row | {"apex_cm": times(row["apex_mean"], 100.0)} for row in figures["at_speed"]]
-    return (
-        "## The policy that ships\n\n"
-        f"`{card['command']}`, seed {card['seed']}, commit {card['commit'][:10]}: "
-        f"{card['iterations']} iterations, {card['steps'] / 1e6:.1f} M steps, "
-        f"{card['wall_time_minutes']:.0f} min on {card['machine']}. Its files and the figures of "
-        "this section are made by `python -m mute.release --checkpoint "
-        f"runs/go1_mute/RUN/model_{card['iterations'] - 1}.pt`.\n\n"
-        f"{_first_walk(files)}\n\n"
-        f"Over the command range, {figures['trials']} trials of {figures['seconds']:g} s:\n\n"
-        f"{markdown(figures['range'], _RANGE)}\n\n"
-        f"At an actual forward speed of {figures['speed']:g} m/s:\n\n"
-        f"{markdown(in_cm, _AT_SPEED)}"
-    )
-
-
-def _first_walk(files: ResultFiles) -> str:
-    """Tell when the training that made the policy walked for the first time."""
-    seed = files.card["seed"]
-    run = files.seeds[seed]
-    progress, first = run.progress, run.first_walk
-    if progress is None:
-        return "When it walked for the first time was not measured."
-    when = (
-        f"for the first time after {first['iteration']} iterations, {first['minutes']:.1f} min"
-        if first
-        else "at no checkpoint"
-    )
-    randomized = progress.get("randomized")
-    robots = "robots that differ and see with noise" if randomized else "the exact robot"
-    return (
-        f"Its training walked (error below 0.05, falls below 1 %, {progress['trials']} trials of "
-        f"{robots}) {when}: "
-        f"`python evaluate.py progress{' --randomized' if randomized else ''} "
-        f"--run runs/go1_mute/RUN` (`docs/reliability/seed{seed}_progress.json`)."
-    )
+def _flat(files: ResultFiles) -> list[str]:
+    """Return the section on the recipe of flat ground, none if it is the one that ships."""
+    recipe = files.flat
+    if recipe is None:
+        return []
+    return [
+        f"## On flat ground alone\n\n`{recipe.task}`, the recipe without ground, takes minutes. "
+        f"It is what recipes were compared by; its policy is `--task {recipe.task}` for every "
+        f"command.\n\n{trainings_table(recipe)}",
+        _reliability(recipe),
+        policy_figures(recipe),
+    ]
 
 
 def _noise(files: ResultFiles) -> str:
@@ -278,11 +203,14 @@ def _exact_robots(noise: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _paper_task(files: ResultFiles) -> str:
-    card, paper = files.card, files.paper_task
+    recipe = files.flat or files.ships
+    card, paper = recipe.card, files.paper_task
     loud, quiet = paper["at_speed"][0], paper["at_speed"][-1]
     slower = 1.0 - quiet["landing_speed_mean"] / loud["landing_speed_mean"]
     rows = [
-        _task_row("`go1_mute`", f"all of its {card['steps'] / 1e6:.1f} M steps", card["figures"]),
+        _task_row(
+            f"`{recipe.task}`", f"all of its {card['steps'] / 1e6:.1f} M steps", card["figures"]
+        ),
         _task_row("`go1_mute_paper`", "8.6 M of its 590 M steps", paper),
     ]
     return (
@@ -292,7 +220,7 @@ def _paper_task(files: ResultFiles) -> str:
         "seed 0 (`docs/go1_mute_paper.json`). With the paper's exact reward the feet are lifted by "
         f"{1000.0 * loud['apex_mean']:.0f} mm at beta 0 and {1000.0 * quiet['apex_mean']:.0f} mm "
         f"at beta 1, which lands {abs(slower):.0%} {'slower' if slower >= 0.0 else 'faster'}. "
-        "Whether the steps that are missing change that is not known here. What `go1_mute` "
+        f"Whether the steps that are missing change that is not known here. What `{recipe.task}` "
         "adds, and why, is in [method.md](method.md)."
     )
 
@@ -304,11 +232,10 @@ def _shortcomings(files: ResultFiles) -> str:
     same_command = _drops_at_command(files.sweep_speed)
     shares = {row["surface"]: _not_of_feet(row) for row in noise if row["beta"] == 1.0}
     least, most = min(shares, key=shares.__getitem__), max(shares, key=shares.__getitem__)
-    missed = unmet(files.seeds)
-    told = f"- Not every training meets every target of reliability: {missed}.\n" if missed else ""
+    recipes = [files.ships] if files.flat is None else [files.ships, files.flat]
+    told = "".join(_missed(recipe) + _earlier_levels(recipe, files) for recipe in recipes)
     return (
-        "## Where it falls short\n\n"
-        f"{told}{_earlier_levels(files)}"
+        f"## Where it falls short\n\n{told}"
         "- At a high beta the robot walks slower than it is asked to: asked for 0.5 m/s on wood, "
         f"{quiet['speed_mean']:.2f}. So compare at equal actual speed.\n"
         "- The mean level on wood falls from beta 0 to beta 1 by "
@@ -323,17 +250,26 @@ def _shortcomings(files: ResultFiles) -> str:
     )
 
 
-def _earlier_levels(files: ResultFiles) -> str:
+def _missed(recipe: Recipe) -> str:
+    """Say which targets which trainings do not meet."""
+    missed = unmet(recipe.seeds)
+    if not missed:
+        return ""
+    return f"- Not every training of `{recipe.task}` meets every target of reliability: {missed}.\n"
+
+
+def _earlier_levels(recipe: Recipe, files: ResultFiles) -> str:
     """Say of which trainings the levels are of an earlier model of the sound."""
     earlier = [
         str(seed)
-        for seed, run in files.seeds.items()
+        for seed, run in recipe.seeds.items()
         if run.reliability.get("calibration_sha256") != files.calibration
     ]
     if not earlier:
         return ""
     return (
-        "- The two levels in the table of reliability, of a stand and of beta 1 beside beta 0, are "
+        f"- The two levels in the table of reliability of `{recipe.task}`, of a stand and of "
+        "beta 1 beside beta 0, are "
         f"of an earlier model of the sound (seeds {', '.join(earlier)}), in which drives were "
         "quieter; all other levels on this page are of the present one. By that, robots that stand "
         "with noisy sensors have some 58 dBA, above the target, as gears are heard where torques "
@@ -347,10 +283,10 @@ def _task_row(name: str, trained: str, figures: Mapping[str, Any]) -> dict[str, 
         "name": name,
         "trained": trained,
         "falls": max(row["fall_rate"] for row in figures["range"]),
-        "error": _ends(figures["range"], "velocity_error_sq", "{:.3f}"),
-        "landing": _ends(at_speed, "landing_speed_mean", "{:.3f}"),
-        "apex": _ends(at_speed, "apex_mean", "{:.1f}", 100.0),
-        "strides": _ends(at_speed, "stride_frequency", "{:.1f}"),
+        "error": ends(figures["range"], "velocity_error_sq", "{:.3f}"),
+        "landing": ends(at_speed, "landing_speed_mean", "{:.3f}"),
+        "apex": ends(at_speed, "apex_mean", "{:.1f}", 100.0),
+        "strides": ends(at_speed, "stride_frequency", "{:.1f}"),
     }
 
 
@@ -364,11 +300,6 @@ def _noise_row(row: Mapping[str, Any]) -> dict[str, Any]:
         "paper": None if measured is None else f"{measured[0]:.1f}, {measured[1]:.1f}",
         "apex_cm": times(row["apex_mean"], 100.0),
     }
-
-
-def _ends(rows: Sequence[Mapping[str, Any]], name: str, form: str, factor: float = 1.0) -> str:
-    """Return a figure at the first and at the last beta."""
-    return ", ".join(form.format(factor * row[name]) for row in (rows[0], rows[-1]))
 
 
 def _drops_at_speed(sweep: Sequence[Mapping[str, Any]]) -> dict[float, float]:

@@ -22,6 +22,7 @@ from mute.command_lines.arguments import (
     check_seed,
     check_words,
     make_directory,
+    spelled,
 )
 from mute.command_lines.policy_options import PolicyArgs
 from mute.command_lines.sound_options import progress_bar
@@ -31,7 +32,9 @@ from mute.envs.terrain import KINDS
 from mute.envs.terrain.figures import LEVELS
 from mute.evaluation.crossing import cross, crossing_cfg
 from mute.evaluation.endurance import HARDSHIPS, LONGEST_PUSHES, be_pushed, bear, walk_at_random
+from mute.evaluation.reliability.figures import shown
 from mute.evaluation.tables import print_table, write_csv, write_json
+from mute.evaluation.terrain_targets import terrain_targets
 from mute.support.plain_data import without_nan
 from mute.support.provenance import REPOSITORY, current_commit, file_sha256, machine_kind
 from mute.support.ranges import Range
@@ -40,7 +43,17 @@ from mute.support.signals import exit_status
 __all__ = ["TerrainArgs", "terrain"]
 
 
-_PARTS = ("crossings", "hardships", "pushes", "walk")
+_PARTS = ("crossings", "hardships", "pushes", "tracking", "walk")
+_TRACKING_SEEDS = 5
+_TRACKING_MINUTES = 10.0
+"""As in DreamWaQ's paper."""
+
+
+_MEASURING = (
+    *("parts", "kinds", "levels", "episodes", "seconds", "speed", "beta", "walkers", "minutes"),
+    "seed",
+)
+"""Options that change what is measured."""
 
 
 @dataclass
@@ -52,7 +65,7 @@ class TerrainArgs(PolicyArgs):
 
     parts: Words = _PARTS
     """What to measure: crossings, of kinds and levels; hardships, one at a time; pushes until the
-    fall; walk, half an hour at random commands."""
+    fall; tracking, ten minutes at random commands with five seeds; walk, half an hour of them."""
     kinds: Words = tuple(KINDS)
     """Kinds of ground: flat, slopes, uneven, blocks, stairs, stairs_down, rooms."""
     levels: tuple[int, ...] = tuple(range(LEVELS))
@@ -66,7 +79,8 @@ class TerrainArgs(PolicyArgs):
     beta: float = 0.0
     """Quiet factor."""
     walkers: int = 64
-    """Robots that are pushed until they fall, and that walk at random."""
+    """Robots that are pushed until they fall, and that walk at random, a quarter as many with each
+    seed of tracking."""
     minutes: float = 30.0
     """How long those walk, min."""
     seed: int = 1
@@ -128,6 +142,7 @@ def terrain(args: TerrainArgs) -> int:
             "iteration": policy.iteration,
             "commit": current_commit(),
             "machine": machine_kind(),
+            "options": spelled(args, _MEASURING),
             "beta": args.beta,
             "seconds": args.seconds,
             "seed": args.seed,
@@ -156,6 +171,14 @@ def _tasks(args: TerrainArgs, policy: Policy) -> list[_Task]:
     def pushes(advance: Callable[[], None]) -> dict[str, Any]:
         return be_pushed(policy, args.walkers, beta, seed, advance).as_dict()
 
+    def tracking(own_seed: int) -> _Task:
+        def measure(advance: Callable[[], None]) -> dict[str, Any]:
+            robots = max(args.walkers // 4, 1)
+            row = walk_at_random(policy, robots, _TRACKING_MINUTES, beta, own_seed, advance)
+            return row.as_dict()
+
+        return _Task("tracking", 60.0 * _TRACKING_MINUTES, measure)
+
     def walk(advance: Callable[[], None]) -> dict[str, Any]:
         return walk_at_random(policy, args.walkers, args.minutes, beta, seed, advance).as_dict()
 
@@ -168,6 +191,7 @@ def _tasks(args: TerrainArgs, policy: Policy) -> list[_Task]:
         ),
         *map(hardship, HARDSHIPS),
         _Task("pushes", LONGEST_PUSHES, pushes),
+        *(tracking(seed + index) for index in range(_TRACKING_SEEDS)),
         _Task("walk", 60.0 * args.minutes, walk),
     ]
 
@@ -176,6 +200,7 @@ _TITLES = {
     "crossings": "ground: {0.episodes} episodes of {0.seconds:g} s",
     "hardships": "hardships: {0.episodes} episodes of {0.seconds:g} s on flat ground",
     "pushes": "pushes along any direction every second, each stronger, until the fall",
+    "tracking": "random commands, drawn anew every 10 s, by seed",
     "walk": "random commands, drawn anew every 10 s",
 }
 
@@ -183,7 +208,8 @@ _TITLES = {
 def _report(
     args: TerrainArgs, about: dict[str, Any], tables: dict[str, list[dict[str, Any]]]
 ) -> None:
-    content = about | tables
+    figures = [figure.as_dict() for figure in terrain_targets(tables)]
+    content = about | tables | {"figures": figures}
     write_json(args.out / "terrain.json", content)
     names = ["terrain.json"]
     for part, rows in tables.items():
@@ -194,7 +220,23 @@ def _report(
         return
     for part, rows in tables.items():
         print_table(_TITLES[part].format(args), rows, list(rows[0]))
+    _print_targets(figures)
     print(f"written to {args.out}: {', '.join(names)}")
+
+
+def _print_targets(figures: list[dict[str, Any]]) -> None:
+    if not figures:
+        return
+    rows = [
+        row
+        | {
+            "value": shown(row["value"], row["unit"]),
+            "met": "met" if row["met"] else "NOT MET",
+        }
+        for row in figures
+    ]
+    print_table("targets, at the worst speed", rows, ["part", "name", "value", "target", "met"])
+    print(f"{sum(row['met'] for row in figures)} of {len(figures)} targets are met")
 
 
 def _check(args: TerrainArgs) -> None:

@@ -54,12 +54,12 @@ from mute.learning.saved_state import check_iteration
 from mute.support.errors import EXIT_USER_ERROR, MuteError
 from mute.support.files import DiskError
 from mute.support.threads import core_share
-from mute.tasks import DEFAULT_TASK, make_task
+from mute.tasks import DEFAULT_TASK, FLAT_TASK, make_task
 
 __all__ = ["main"]
 
 _GPU_ENVS = 4096
-"""Environments of `go1_mute` on a GPU; its own 1024 suit a CPU."""
+"""Environments of the recipe on flat ground on a GPU; its own 1024 suit a CPU."""
 
 
 @dataclass
@@ -229,7 +229,7 @@ def _arguments(argv: Sequence[str]) -> tuple[TrainArgs, Path | None]:
     cfg = make_task(task)
     args = _parse(argv, task, cfg)
     if args.resume is None:
-        if task == DEFAULT_TASK and resolve_device(args.device) == "cuda":
+        if task in (DEFAULT_TASK, FLAT_TASK) and resolve_device(args.device) == "cuda":
             cfg = dataclasses.replace(cfg, env=dataclasses.replace(cfg.env, num_envs=_GPU_ENVS))
             args = _parse(argv, task, cfg)
         return args, None

@@ -25,7 +25,7 @@ from mute.envs.quadruped_env import NUM_ACTIONS
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.scene import JOINT_NAMES, STAND_JOINT_POS
 from mute.support.errors import MuteError
-from mute.tasks import DEFAULT_TASK, make_task
+from mute.tasks import FLAT_TASK, make_task
 
 __all__ = ["OnnxController", "OnnxPolicy", "load_onnx_policy"]
 
@@ -118,7 +118,7 @@ def load_onnx_policy(path: Path) -> OnnxPolicy:
     session = _open(path)
     metadata = session.get_modelmeta().custom_metadata_map
     try:
-        cfg = make_task(DEFAULT_TASK)
+        cfg = make_task(FLAT_TASK)
         cfg = dataclasses.replace(cfg, env=_robots(cfg.env, metadata))
         policy = OnnxPolicy(path.name, cfg, session, json.loads(metadata["recurrent_state"]))
     except KeyError as error:

@@ -1,9 +1,10 @@
 """How much a policy bears on flat ground: single hardships, pushes until it falls, a long walk.
 
-The last two are the tests of DreamWaQ's paper that need no hardware (arXiv 2301.10602, section IV):
-pushes along random directions of space every second until the fall, and half an hour of random
-commands, drawn anew every 10 s. How strong a push is, the paper does not say: here each is a little
-stronger than the one before, and the largest that was borne counts.
+Beside hardships, these are the tests of DreamWaQ's paper that need no hardware (arXiv 2301.10602,
+section IV): random commands, drawn anew every 10 s, for 10 minutes with five seeds and for half an
+hour, and pushes along random directions of space every second until the fall. Commands are of up to
+1 m/s and rad/s, or of the task's own range if that is less. How strong a push is, the paper does
+not say: here each is a little stronger than the one before, and the largest that was borne counts.
 """
 
 from __future__ import annotations
@@ -97,6 +98,8 @@ class LongWalk:
     """Robots."""
     minutes: float
     """How long they walked, min."""
+    seed: int
+    """Of robots, first states, noise and commands."""
     survived: float
     """Share that neither fell nor had its simulation turn unstable."""
     velocity_rmse: float
@@ -246,7 +249,7 @@ def walk_at_random(
         counted += int(left.sum())
         on_step()
     velocity, yaw = (squares / max(counted, 1)).sqrt().tolist()
-    return LongWalk(robots, minutes, 1.0 - float(ended.double().mean()), velocity, yaw)
+    return LongWalk(robots, minutes, seed, 1.0 - float(ended.double().mean()), velocity, yaw)
 
 
 def _make_env(

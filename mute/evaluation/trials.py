@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 
 import torch
@@ -12,6 +13,7 @@ from mute.controllers.controller import Controller
 from mute.envs.commands import CommandSampler, CommandsCfg
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
+from mute.envs.scene import SceneCfg
 from mute.envs.terrain import TerrainCfg
 from mute.evaluation.gait import GaitMeter
 
@@ -29,7 +31,8 @@ def evaluation_cfg(
     """Return a task's environment for measuring.
 
     Commands are set by whoever measures and never drawn anew within an episode. The engine is the
-    one that suits the device, whichever the policy was trained with.
+    one that suits the device, whichever the policy was trained with, and physics steps are at most
+    the usual ones, as coarser ones teach well and measure badly.
 
     Args:
         cfg: The environment that the policy was trained in.
@@ -41,7 +44,7 @@ def evaluation_cfg(
         terrain: Ground to measure on; flat unless given, whatever the policy was trained on.
     """
     measured = dataclasses.replace(
-        cfg,
+        _in_usual_steps(cfg),
         num_envs=num_envs,
         engine="auto",
         seed=seed,
@@ -57,6 +60,15 @@ def evaluation_cfg(
         observations=dataclasses.replace(cfg.observations, noise_level=0.0),
         randomization=dataclasses.replace(cfg.randomization, enabled=False),
     )
+
+
+def _in_usual_steps(cfg: QuadrupedEnvCfg) -> QuadrupedEnvCfg:
+    """Return the environment with physics steps no longer than those of `SceneCfg`."""
+    steps = math.ceil(cfg.step_dt / SceneCfg().timestep - 1e-9)
+    if steps <= cfg.decimation:
+        return cfg
+    scene = dataclasses.replace(cfg.scene, timestep=cfg.step_dt / steps)
+    return dataclasses.replace(cfg, scene=scene, decimation=steps)
 
 
 def from_the_stance(cfg: QuadrupedEnvCfg) -> QuadrupedEnvCfg:

@@ -40,6 +40,7 @@ FORMAT = 2
 
 _LABELS = {
     "go1_mute": "MUTE",
+    "go1_mute_flat": "MUTE, learnt on flat ground",
     "go1_dreamwaq": "DreamWaQ",
     "go1_mute_paper": "MUTE, as in the paper",
 }

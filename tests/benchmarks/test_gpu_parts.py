@@ -192,7 +192,7 @@ def test_every_part_is_asked_for_what_its_program_knows(
     engines, training, *rates = gpu._parts(gpu._arguments(argv), tmp_path)
     assert parse(gpu_engines.GpuEnginesArgs, _words(engines), "").device == device
     args, _ = train._arguments(_words(training))
-    assert (args.task, args.device, args.num_envs) == ("go1_mute", device, robots)
+    assert (args.task, args.device, args.num_envs) == ("go1_mute_flat", device, robots)
     asked = [parse(gpu_rates.GpuRatesArgs, _words(part), "") for part in rates]
     assert [each.num_envs for each in asked] == sizes
     assert {(each.device, each.peers_from) for each in asked} == {(device, tmp_path)}

@@ -14,12 +14,12 @@ from benchmarks.levers import LEVERS, table
 from mute.learning.resumption import flat_fields
 from mute.support.errors import MuteError
 from mute.support.provenance import REPOSITORY
-from mute.tasks import DEFAULT_TASK, make_task
+from mute.tasks import FLAT_TASK, make_task
 
 
 @pytest.mark.parametrize("lever", [name for name in LEVERS if name != "recipe"])
 def test_each_lever_changes_what_the_recipe_has(lever):
-    assert LEVERS[lever].flags or LEVERS[lever].task != DEFAULT_TASK
+    assert LEVERS[lever].flags or LEVERS[lever].task != FLAT_TASK
     fields = flat_fields(make_task(LEVERS[lever].task))
     words = LEVERS[lever].flags.split()
     while words:
@@ -30,7 +30,7 @@ def test_each_lever_changes_what_the_recipe_has(lever):
 
 
 def test_a_recipe_with_rare_stops_has_fewer_of_them_and_holds_commands_longer():
-    commands = make_task(DEFAULT_TASK).env.commands
+    commands = make_task(FLAT_TASK).env.commands
     words = LEVERS["rare_stops"].flags.split()
     told = {option: float(value) for option, value in zip(words[::2], words[1::2], strict=True)}
     assert told["--env.commands.standing-fraction"] < commands.standing_fraction
@@ -122,7 +122,7 @@ def test_a_lever_of_another_task_trains_that_one(programs, tmp_path):
 
 
 def test_a_training_that_was_stopped_goes_on_from_its_last_checkpoint(programs, tmp_path):
-    run = tmp_path / "runs" / DEFAULT_TASK / f"recipe.0.30.{_recipe()}"
+    run = tmp_path / "runs" / FLAT_TASK / f"recipe.0.30.{_recipe()}"
     run.mkdir(parents=True)
     with pytest.raises(MuteError, match=r"recipe\.0\.30\..* before its first checkpoint"):
         _main(tmp_path, "--levers", "recipe", "--seeds", "0")
@@ -163,7 +163,7 @@ def test_what_was_found_under_other_conditions_is_not_taken_for_this(programs, t
 def test_files_of_another_recipe_are_not_taken_for_this_one(programs, tmp_path, monkeypatch):
     words = ("--levers", "recipe", "--seeds", "0")
     assert _main(tmp_path, *words) == 0
-    changed = make_task(DEFAULT_TASK)
+    changed = make_task(FLAT_TASK)
     changed.agent.init_std = 0.7
     monkeypatch.setattr(levers, "make_task", lambda name: changed)
     with pytest.raises(MuteError, match=r"recipe\.0\.json has recipe "):
@@ -189,7 +189,7 @@ def test_a_file_that_lacks_a_figure_is_named(tmp_path):
 
 
 def test_the_figures_of_the_table_are_figures_of_the_exam():
-    files = sorted((REPOSITORY / "docs" / "reliability").glob("seed?.json"))
+    files = sorted((REPOSITORY / "docs" / "reliability").rglob("seed?.json"))
     assert files
     for file in files:
         names = {figure["name"] for figure in json.loads(file.read_text())["figures"]}

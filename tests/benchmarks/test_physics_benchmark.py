@@ -12,7 +12,7 @@ from benchmarks import physics as benchmark
 from benchmarks.physics import Variant
 from mute.envs.scene import make_spec
 from mute.support.errors import MuteError
-from mute.tasks import DEFAULT_TASK, make_task
+from mute.tasks import FLAT_TASK, make_task
 
 
 def test_it_compares_every_variant_with_the_scene_as_it_is(capsys, tmp_path, monkeypatch):
@@ -45,7 +45,7 @@ def test_it_compares_every_variant_with_the_scene_as_it_is(capsys, tmp_path, mon
 
 def _compiled(variant: benchmark.Variant) -> bytes:
     """Return all that a variant's robots are made of: model, control step and randomisation."""
-    cfg = variant.cfg(make_task(DEFAULT_TASK).env)
+    cfg = variant.cfg(make_task(FLAT_TASK).env)
     spec = make_spec(cfg.scene, pictured=variant.pictured)
     if variant.spec is not None:
         variant.spec(spec)

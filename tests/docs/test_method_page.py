@@ -10,10 +10,10 @@ from places import REPOSITORY
 
 from mute.envs.commands import CommandSampler
 from mute.envs.rewards import paper_terms
-from mute.tasks import make_task
+from mute.tasks import FLAT_TASK, make_task
 
 _PAGE = " ".join((REPOSITORY / "docs" / "method.md").read_text().split())
-_CFG = make_task("go1_mute")
+_CFG = make_task(FLAT_TASK)
 
 
 def _weights_told() -> dict[str, float]:

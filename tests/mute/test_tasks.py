@@ -12,7 +12,7 @@ from mute import tasks
 from mute.config import TaskCfg
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.support.errors import MuteError
-from mute.tasks import DEFAULT_TASK, make_task, register_task, task_names
+from mute.tasks import DEFAULT_TASK, FLAT_TASK, INDOOR_TASK, make_task, register_task, task_names
 
 TABLE_I = {
     "lin_vel_tracking": 1.0,
@@ -57,6 +57,18 @@ def test_the_default_task_asks_for_more_lift_than_the_papers():
     # With Table I alone the feet rise less than a centimetre.
     rewards = make_task(DEFAULT_TASK).env.rewards
     assert rewards.terms.keys() & {"touchdown_apex", "foot_clearance"}
+
+
+def test_the_recipe_indoors_is_the_flat_one_over_ground():
+    flat, indoor = make_task(FLAT_TASK), make_task(INDOOR_TASK)
+    assert (flat.env.terrain.kind, indoor.env.terrain.kind) == ("flat", "indoor")
+    assert indoor.env.step_dt == flat.env.step_dt
+    assert indoor.env.randomization.floor_stiffness == (0.5, 1.0)
+    ours, theirs = indoor.env.rewards.terms, flat.env.rewards.terms
+    assert ours.keys() ^ theirs.keys() == {"lean", "tilt"}
+    assert all(ours[name] == theirs[name] for name in ours.keys() & theirs.keys())
+    assert indoor.agent.ppo == flat.agent.ppo
+    assert indoor.agent.estimation == flat.agent.estimation
 
 
 @pytest.mark.parametrize("task", task_names())
@@ -162,7 +174,7 @@ QUIET = {
 
 @pytest.mark.parametrize("name", QUIET)
 def test_a_quiet_term_of_the_literature_is_all_that_beta_scales(name):
-    terms, recipe = make_task(name).env.rewards.terms, make_task(DEFAULT_TASK).env.rewards.terms
+    terms, recipe = (make_task(task).env.rewards.terms for task in (name, FLAT_TASK))
     scaled = {key for key, term in terms.items() if term.group == "phase" and term.weight != 0.0}
     assert scaled == QUIET[name]
     others = {key: term for key, term in terms.items() if term.group != "phase"}

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from mute.config import TaskCfg
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
-from mute.tasks import DEFAULT_TASK, make_task
+from mute.tasks import FLAT_TASK, make_task
 
 from .controller import MpcController
 from .settings import MpcCfg
@@ -16,8 +16,8 @@ __all__ = ["MpcDriver"]
 
 
 def _robots() -> TaskCfg:
-    """Return the robots of the default task, with all that they measure."""
-    cfg = make_task(DEFAULT_TASK)
+    """Return the robots of the flat task, with all that they measure."""
+    cfg = make_task(FLAT_TASK)
     observations = dataclasses.replace(cfg.env.observations, sensors=True)
     return dataclasses.replace(cfg, env=dataclasses.replace(cfg.env, observations=observations))
 
@@ -27,7 +27,7 @@ class MpcDriver:
     """Makes model-predictive controllers, see `mute.controllers.driver.Driver`."""
 
     cfg: TaskCfg = field(default_factory=_robots)
-    """The robots, which are those of the default task."""
+    """The robots, which are those of the flat task."""
     settings: MpcCfg = field(default_factory=MpcCfg)
     """What the controller is set to."""
     task: str = "mpc"

@@ -21,11 +21,11 @@ from mute.command_lines.benchmark_peers import (
     peer_pythons,
     time_peers,
 )
-from mute.tasks import DEFAULT_TASK
+from mute.tasks import FLAT_TASK
 
 
 def _time(name: str, python: Path, own: Path, rounds: int = 1) -> PeerRate:
-    return time_peers([name], {ITSELF: own, name: python}, 8, rounds, DEFAULT_TASK)[1]
+    return time_peers([name], {ITSELF: own, name: python}, 8, rounds, FLAT_TASK)[1]
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def test_mute_and_peers_are_asked_in_turns_back_and_forth(tmp_path, own):
     pythons = {ITSELF: own} | {
         name: peer_python(tmp_path, name, answers) for name in ("mjlab", "unilab")
     }
-    time_peers(["mjlab", "unilab"], pythons, 8, 1, DEFAULT_TASK)
+    time_peers(["mjlab", "unilab"], pythons, 8, 1, FLAT_TASK)
     asked = (tmp_path / "asked").read_text().splitlines()
     there, back = ["mute", "mjlab", "unilab"], ["unilab", "mjlab", "mute"]
     assert asked == [
@@ -138,7 +138,7 @@ def test_an_interrupt_while_a_peer_starts_leaves_nothing_running(tmp_path, monke
 
     monkeypatch.setattr(Peer, "_answer", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        time_peers(["mjlab"], {ITSELF: python}, 8, 1, DEFAULT_TASK)
+        time_peers(["mjlab"], {ITSELF: python}, 8, 1, FLAT_TASK)
     with held.open("r+") as free:
         fcntl.flock(free, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
@@ -152,7 +152,7 @@ def test_what_is_known_is_told_after_every_round(tmp_path, own):
 
     python = peer_python(tmp_path, "mjlab", "dict(steps=100 * number, seconds=1.0)")
     pythons = {ITSELF: own, "mjlab": python}
-    time_peers(["mjlab"], pythons, 8, 2, DEFAULT_TASK, after_round=after_round)
+    time_peers(["mjlab"], pythons, 8, 2, FLAT_TASK, after_round=after_round)
     # The first round of each part does not count.
     assert told == [
         (None, None, 0), (200.0, None, 1), (250.0, None, 2),
@@ -187,7 +187,7 @@ def test_a_peer_that_breaks_says_so(tmp_path, own, script, note):
 @pytest.fixture(scope="module")
 def itself():
     """MUTE itself, as it is timed beside the peers."""
-    peer = Peer(ITSELF, Path(sys.executable), 4, DEFAULT_TASK)
+    peer = Peer(ITSELF, Path(sys.executable), 4, FLAT_TASK)
     yield peer
     peer.close()
 
@@ -195,7 +195,7 @@ def itself():
 def test_mute_trains_and_steps_as_many_robots_as_it_is_told(itself):
     assert itself.fault is None
     assert (itself.rate.robot, itself.rate.task, itself.rate.num_envs) == (
-        "Unitree Go1", DEFAULT_TASK, 4,
+        "Unitree Go1", FLAT_TASK, 4,
     )  # fmt: skip
     assert (itself.rate.physics_step, itself.rate.decimation) == (0.005, 4)
     for _ in range(2):

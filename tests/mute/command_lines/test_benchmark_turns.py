@@ -25,12 +25,12 @@ from mute.command_lines.benchmark_turns import (
 )
 from mute.support import threads
 from mute.support.errors import MuteError
-from mute.tasks import DEFAULT_TASK
+from mute.tasks import FLAT_TASK
 
 
 @pytest.fixture(scope="module")
 def training():
-    training = benchmark_worker._Training(DEFAULT_TASK, 4)
+    training = benchmark_worker._Training(FLAT_TASK, 4)
     # The engine alone is not pushed.
     training.runner.env.env.cfg.randomization.push_interval = 0.0
     return training
@@ -178,7 +178,7 @@ def test_times_are_told_by_version_and_part_block_by_block():
 
 
 def test_a_worker_does_each_part_and_says_what_it_is():
-    with Worker(THIS, DEFAULT_TASK, 4) as worker:
+    with Worker(THIS, FLAT_TASK, 4) as worker:
         assert worker.ready["control_steps"] == 96
         assert worker.ready["peak_memory_mb"] > 100.0
         loop = worker.time("loop")
@@ -193,7 +193,7 @@ def test_a_worker_does_each_part_and_says_what_it_is():
 
 
 def test_what_a_worker_cannot_do_is_told_in_its_words():
-    for task, num_envs, told in (("fly", 4, "'fly'"), (DEFAULT_TASK, 2, "env.num_envs")):
+    for task, num_envs, told in (("fly", 4, "'fly'"), (FLAT_TASK, 2, "env.num_envs")):
         expected = rf"^the new version: .*{told}"
         with pytest.raises(MuteError, match=expected), Worker(THIS, task, num_envs):
             pass
@@ -203,7 +203,7 @@ def test_a_tree_that_lacks_a_part_is_told_and_not_completed_from_another_one(tmp
     (tmp_path / "mute").mkdir()
     (tmp_path / "mute" / "__init__.py").touch()
     version = Version("old", sys.executable, tmp_path)
-    with pytest.raises(MuteError) as caught, Worker(version, DEFAULT_TASK, 2):
+    with pytest.raises(MuteError) as caught, Worker(version, FLAT_TASK, 2):
         pass
     # The second is where MUTE is installed for development.
     told = "the process of the old version ended with status 1: "
@@ -222,7 +222,7 @@ def test_a_tree_that_lacks_a_part_is_told_and_not_completed_from_another_one(tmp
 )
 def test_a_worker_that_dies_is_told_in_one_line(tmp_path, script, told):
     version = other_version(_program(tmp_path, script))
-    with pytest.raises(MuteError) as caught, Worker(version, DEFAULT_TASK, 2):
+    with pytest.raises(MuteError) as caught, Worker(version, FLAT_TASK, 2):
         pass
     assert str(caught.value) == f"the process of the old version {told}"
 
@@ -230,7 +230,7 @@ def test_a_worker_that_dies_is_told_in_one_line(tmp_path, script, told):
 def test_workers_end_with_whoever_is_interrupted_beside_them(tmp_path):
     ready = json.dumps({"ready": {"engine": "none"}})
     version = other_version(_program(tmp_path, f"echo '{ready}'; cat > /dev/null"))
-    with pytest.raises(KeyboardInterrupt), Worker(version, DEFAULT_TASK, 2) as worker:
+    with pytest.raises(KeyboardInterrupt), Worker(version, FLAT_TASK, 2) as worker:
         assert worker.ready == {"engine": "none"}
         assert worker._process.poll() is None
         raise KeyboardInterrupt
@@ -238,7 +238,7 @@ def test_workers_end_with_whoever_is_interrupted_beside_them(tmp_path):
 
 
 def test_a_worker_trains_with_the_seed_that_it_is_given():
-    one, other = (benchmark_worker._Training(DEFAULT_TASK, 4, seed) for seed in (3, 4))
+    one, other = (benchmark_worker._Training(FLAT_TASK, 4, seed) for seed in (3, 4))
     assert one.runner.env.env.cfg.seed == 3
     fields = (each.runner.env.env.simulation.field("geom_friction") for each in (one, other))
     assert not torch.equal(*fields)

@@ -23,6 +23,10 @@ def files():
     return card.read_results(card.CardArgs())
 
 
+def _with(files, seeds):
+    return dataclasses.replace(files, ships=dataclasses.replace(files.ships, seeds=seeds))
+
+
 @pytest.mark.parametrize("name", ["results.md", "sound.md", "terrain.md", "mpc.md", "benchmark.md"])
 def test_a_committed_page_is_what_the_command_makes(name, tmp_path):
     assert card.main(["--out", str(tmp_path)]) == 0
@@ -44,7 +48,7 @@ def test_without_a_directory_all_pages_are_printed(capsys):
 def test_a_spread_is_that_of_the_trainings(files):
     gaits = {}
     for seed, (error, landing) in {0: (0.01, 0.5), 1: (0.02, 0.6), 2: (0.06, 0.7)}.items():
-        gait = files.card["figures"]
+        gait = files.ships.card["figures"]
         first, *others = gait["range"]
         slow, *rest = gait["at_speed"]
         gaits[seed] = gait | {
@@ -52,10 +56,8 @@ def test_a_spread_is_that_of_the_trainings(files):
             "at_speed": [slow | {"landing_speed_mean": landing, "apex_mean": 0.05}, *rest],
         }
     seeds = {seed: SeedFiles({}, gait=gait) for seed, gait in gaits.items()}
-    [row] = re.findall(
-        r"^\| 0 \|.*$", summary(dataclasses.replace(files, seeds=seeds)), re.MULTILINE
-    )
-    robots = 3 * files.card["figures"]["trials"]
+    [row] = re.findall(r"^\| 0 \|.*$", summary(_with(files, seeds)), re.MULTILINE)
+    robots = 3 * files.ships.card["figures"]["trials"]
     told = f"| 0 | 0 of {robots} | 0.030 ± 0.026 | 0.60 ± 0.10 | 5.0 ± 0.0 |"
     assert row.startswith(told)
 
@@ -66,19 +68,29 @@ def test_a_mean_has_the_sample_standard_deviation_beside_it():
 
 
 def test_a_robot_that_fell_in_one_training_is_counted(files):
-    seed, run = next(iter(files.seeds.items()))
-    gaits = [each["range"][0]["fall_rate"] * each["trials"] for each in files.gaits.values()]
-    robots = sum(each["trials"] for each in files.gaits.values())
+    seed, run = next(iter(files.ships.seeds.items()))
+    gaits = [each["range"][0]["fall_rate"] * each["trials"] for each in files.ships.gaits.values()]
+    robots = sum(each["trials"] for each in files.ships.gaits.values())
     first, *others = run.gait["range"]
     worse = [first | {"fall_rate": first["fall_rate"] + 2.0 / run.gait["trials"]}, *others]
-    fallen = files.seeds | {seed: dataclasses.replace(run, gait=run.gait | {"range": worse})}
-    changed = summary(dataclasses.replace(files, seeds=fallen))
+    fallen = files.ships.seeds | {seed: dataclasses.replace(run, gait=run.gait | {"range": worse})}
+    changed = summary(_with(files, fallen))
     assert f"| 0 | {round(sum(gaits)) + 2} of {robots} |" in changed
 
 
+def test_the_recipe_of_flat_ground_has_a_section_of_its_own_where_another_ships(files):
+    assert "## On flat ground alone" not in results_page(dataclasses.replace(files, flat=None))
+    flat = dataclasses.replace(files.ships, task="go1_mute_flat")
+    page = results_page(dataclasses.replace(files, flat=flat))
+    own = page.split("## On flat ground alone")[1].split("\n## ")[0]
+    assert "python train.py --task go1_mute_flat --seed SEED" in own
+    assert "docs/reliability/go1_mute_flat/" in own
+    assert page.count("Not every training of `go1_mute_flat`") == 1
+
+
 def test_the_policy_that_ships_is_the_one_in_the_middle(files):
-    assert sorted(files.seeds) == [0, 1, 2, 3, 4]
-    assert files.card["seed"] == median_seed(files.seeds)
+    assert sorted(files.ships.seeds) == [0, 1, 2, 3, 4]
+    assert files.ships.card["seed"] == median_seed(files.ships.seeds)
 
 
 def test_what_the_level_loses_with_beta_is_compared_at_equal_actual_speed(files):
@@ -108,12 +120,10 @@ def test_levels_of_an_earlier_calibration_are_told_with_their_seeds(files):
             run, reliability=run.reliability | {"calibration_sha256": calibration}
         )
 
-    seeds = {seed: changed(seed, run) for seed, run in files.seeds.items()}
-    assert "model of the sound (seeds 1, 3)" in results_page(
-        dataclasses.replace(files, seeds=seeds)
-    )
-    same = {seed: changed(0, run) for seed, run in files.seeds.items()}
-    assert "earlier model" not in results_page(dataclasses.replace(files, seeds=same))
+    seeds = {seed: changed(seed, run) for seed, run in files.ships.seeds.items()}
+    assert "model of the sound (seeds 1, 3)" in results_page(_with(files, seeds))
+    same = {seed: changed(0, run) for seed, run in files.ships.seeds.items()}
+    assert "earlier model" not in results_page(_with(files, same))
 
 
 def test_markdown_formats_each_column_and_leaves_a_dash_for_what_is_missing():

@@ -17,6 +17,7 @@ from mute.evaluation.reliability.figures import Figure, Target
 from mute.evaluation.tables import read_json, write_json
 from mute.support.errors import MuteError
 from mute.support.resources import RESOURCES
+from mute.tasks import DEFAULT_TASK
 
 
 def _falls(value: float) -> Figure:
@@ -32,8 +33,12 @@ def _write(folder, seed, *figures):
     write_json(folder / f"seed{seed}.json", content)
 
 
+def _section(folder) -> str:
+    return reliability_section(read_seeds(folder), "python train.py", "docs/here")
+
+
 def _rows(folder) -> list[str]:
-    section = reliability_section(read_seeds(folder))
+    section = _section(folder)
     return [line for line in section.splitlines() if line.startswith("| ")][2:]
 
 
@@ -148,8 +153,8 @@ def test_seeds_stand_in_their_order_and_other_files_are_left_alone(tmp_path):
         _write(tmp_path, seed, _falls(0.0))
     (tmp_path / "seed_shipped.json").write_text("no JSON at all")
     assert list(read_seeds(tmp_path)) == [2, 10]
-    assert "Over the seeds 2, 10, " in reliability_section(read_seeds(tmp_path))
-    assert "with 64 robots" in reliability_section(read_seeds(tmp_path))
+    assert "Over the seeds 2, 10, " in _section(tmp_path)
+    assert "with 64 robots" in _section(tmp_path)
 
 
 def test_a_file_of_another_command_is_refused_by_name(tmp_path):
@@ -162,7 +167,8 @@ def test_a_page_without_the_training_that_ships_is_refused(tmp_path):
     seed = read_json(RESOURCES / "go1" / "go1_mute.json")["seed"]
     with pytest.raises(MuteError, match=rf"no seed{seed}\.json, of what ships"):
         card.main(["--reliability", str(tmp_path)])
-    _write(tmp_path, seed, _falls(0.0))  # but no gait
+    (tmp_path / DEFAULT_TASK).mkdir()
+    _write(tmp_path / DEFAULT_TASK, seed, _falls(0.0))  # but no gait
     with pytest.raises(MuteError, match=rf"no file at .*seed{seed}_gait\.json"):
         card.main(["--reliability", str(tmp_path)])
 
@@ -172,11 +178,12 @@ def test_a_page_without_the_training_that_ships_is_refused(tmp_path):
     [({"iteration": 3}, "is of iteration 3, what ships of"), ({"range": []}, r"has betas \[\]")],
 )
 def test_a_training_that_is_not_as_what_ships_is_refused(changed, named, tmp_path):
-    shipped = read_json(RESOURCES / "go1" / "go1_mute.json")
+    shipped, folder = read_json(RESOURCES / "go1" / "go1_mute.json"), tmp_path / DEFAULT_TASK
+    folder.mkdir()
     for seed in (shipped["seed"], shipped["seed"] + 1):
-        _write(tmp_path, seed, _falls(0.0))
-        write_json(tmp_path / f"seed{seed}_gait.json", shipped["figures"])
-    write_json(tmp_path / f"seed{seed}_gait.json", shipped["figures"] | changed)
+        _write(folder, seed, _falls(0.0))
+        write_json(folder / f"seed{seed}_gait.json", shipped["figures"])
+    write_json(folder / f"seed{seed}_gait.json", shipped["figures"] | changed)
     with pytest.raises(MuteError, match=rf"seed{seed}_gait\.json {named}"):
         card.main(["--reliability", str(tmp_path)])
 
@@ -193,7 +200,7 @@ def test_the_seed_in_the_middle_is_so_by_targets_met_and_then_by_how_much_slower
     assert median_seed(read_seeds(tmp_path)) == 1  # of 2, 1, 3, 0 the lesser in the middle
     _write(tmp_path, 4, _falls(0.0), _slower(float("nan")))
     assert median_seed(read_seeds(tmp_path)) == 1  # of 4, 2, 1, 3, 0
-    section = reliability_section(read_seeds(tmp_path))
+    section = _section(tmp_path)
     assert "Of 2 targets they meet 2, 2, 1, 2 and 1; in the middle" in section
     assert "is seed 1." in section
 

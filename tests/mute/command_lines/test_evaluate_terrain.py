@@ -60,7 +60,9 @@ def test_each_kind_and_level_is_a_row_and_flat_ground_but_one(policy_path, tmp_p
 def test_what_a_policy_bears_is_told_part_by_part(policy_path, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(endurance, "LONGEST_PUSHES", 2.0)
     monkeypatch.setattr(evaluate_terrain, "LONGEST_PUSHES", 2.0)
-    words = _words(policy_path, tmp_path, "--parts", "hardships,pushes,walk", "--walkers", "2")
+    monkeypatch.setattr(evaluate_terrain, "_TRACKING_MINUTES", 0.01)
+    parts = "hardships,pushes,tracking,walk"
+    words = _words(policy_path, tmp_path, "--parts", parts, "--walkers", "2")
     assert evaluate.main([*words, "--minutes", "0.02"]) == 0
     printed = capsys.readouterr().out
     content = read_json(tmp_path / "terrain.json")
@@ -69,7 +71,12 @@ def test_what_a_policy_bears_is_told_part_by_part(policy_path, tmp_path, monkeyp
     assert all(row["hardship"] in printed for row in content["hardships"])
     assert content["pushes"][0]["robots"] == content["walk"][0]["robots"] == 2
     assert content["walk"][0]["minutes"] == 0.02
-    for part in ("hardships", "pushes", "walk"):
+    assert [row["seed"] for row in content["tracking"]] == [1, 2, 3, 4, 5]
+    assert {row["robots"] for row in content["tracking"]} == {1}
+    assert content["options"].startswith(" --parts hardships pushes tracking walk --episodes 2 ")
+    assert len(content["figures"]) == 6  # four hardships, pushes, and the walk
+    assert " of 6 targets are met" in printed
+    for part in ("hardships", "pushes", "tracking", "walk"):
         lines = (tmp_path / f"terrain_{part}.csv").read_text().splitlines()
         assert len(lines) == 1 + len(content[part])
         assert f"terrain_{part}.csv" in printed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -61,7 +62,7 @@ def _crossed(policy: Policy, monkeypatch: pytest.MonkeyPatch, events: dict[str, 
             on_step(observations, env.fallen | unstable)
 
     monkeypatch.setattr(crossing, "run_trial", walk)
-    cfg = crossing_cfg(policy, "stairs", 1, episodes=5, seconds=0.2, seed=0)
+    cfg = crossing_cfg(policy, "blocks", 1, episodes=5, seconds=0.2, seed=0)
     return cross(policy, cfg, speed=0.5, beta=0.25, seconds=0.2)
 
 
@@ -72,8 +73,32 @@ def test_a_success_is_more_than_80_percent_of_the_way_without_a_fall(policy, mon
     assert row.falls == pytest.approx(1 / 5)
     shares = [1.0, 0.82, 0.78, 4 / 9, 8 / 9]  # until the fall, and until the numbers were bad
     assert row.made == pytest.approx(sum(shares) / 5)
-    assert (row.kind, row.level, row.episodes) == ("stairs", 1, 5)
+    assert (row.kind, row.level, row.episodes) == ("blocks", 1, 5)
     assert set(row.as_dict()) == {field.name for field in dataclasses.fields(row)}
+
+
+@pytest.mark.parametrize(("kind", "success"), [("stairs", 0.5), ("uneven", 1.0)])
+def test_who_turns_aside_on_stairs_has_climbed_none(policy, monkeypatch, kind, success):
+    # Both make 95 % of the way along where they began, 45 degrees beside x; one turned from x by 30
+    # degrees more, and got but two thirds of the way along x.
+    turned = math.radians(30.0)
+    ahead = 0.95 * 0.1 * torch.tensor([1.0, 1.0 / math.cos(turned)])
+    angle = torch.tensor([0.25 * math.pi, 0.25 * math.pi + turned])
+
+    def walk(env, controller, command, num_steps, on_step):
+        for step in range(num_steps):
+            observations = env.get_observations()
+            controller.act(observations)
+            env.heading = torch.full((2, 2), 0.5**0.5)
+            way = ahead * step / (num_steps - 1)
+            env.base_pos = torch.stack((way * angle.cos(), way * angle.sin(), 0 * way), dim=1)
+            on_step(observations, torch.zeros(2, dtype=torch.bool))
+
+    monkeypatch.setattr(crossing, "run_trial", walk)
+    cfg = crossing_cfg(policy, kind, 1, episodes=2, seconds=0.2, seed=0)
+    row = cross(policy, cfg, speed=0.5, beta=0.0, seconds=0.2)
+    assert row.made == pytest.approx(0.95)
+    assert row.success == success
 
 
 def _standing(heights: list[list[float]], feet: list[float], down: list[bool]) -> Any:

@@ -7,7 +7,7 @@ from standing import Standing
 
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
-from mute.envs.scene import STAND_JOINT_POS
+from mute.envs.scene import STAND_JOINT_POS, SceneCfg
 from mute.evaluation.trials import evaluation_cfg, from_the_stance, run_trial
 
 
@@ -24,6 +24,18 @@ def test_measuring_switches_noise_pushes_and_random_physics_off():
     kept = evaluation_cfg(QuadrupedEnvCfg(), 4, 20.0, seed=5, randomized=True)
     assert kept.randomization.enabled
     assert kept.observations.noise_level == 1.0
+
+
+def test_physics_that_is_coarse_is_measured_in_the_usual_steps_and_finer_as_it_is():
+    def measured(timestep, decimation):
+        cfg = QuadrupedEnvCfg(decimation=decimation, scene=SceneCfg(timestep=timestep))
+        cfg = evaluation_cfg(cfg, 2, 1.0, seed=0)
+        return cfg.scene.timestep, cfg.decimation, cfg.step_dt
+
+    assert measured(0.01, 2) == (0.005, 4, 0.02)
+    assert measured(0.005, 4) == (0.005, 4, 0.02)
+    assert measured(0.002, 10) == (0.002, 10, 0.02)
+    assert measured(0.008, 2) == (0.004, 4, 0.016)
 
 
 def test_a_trial_holds_its_commands_and_does_not_end_in_it():
