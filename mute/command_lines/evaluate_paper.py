@@ -23,10 +23,10 @@ from mute.command_lines.arguments import (
 )
 from mute.command_lines.card_comparison import comparison_report
 from mute.command_lines.evaluate_walk import WalkArgs, walk
-from mute.command_lines.policy_options import DriverArgs
-from mute.command_lines.sound_options import load_audible_policy, progress_bar, tell
+from mute.command_lines.paper_walkers import find_walkers
+from mute.command_lines.sound_options import progress_bar, tell
 from mute.evaluation.comparison.measurements import FULL, QUICK, Extent, Job, Kept, jobs, measure
-from mute.evaluation.comparison.walkers import DREAMWAQ, MPC, MUTE, Walker
+from mute.evaluation.comparison.walkers import Walker
 from mute.evaluation.plotting import check_matplotlib
 from mute.evaluation.tables import print_table, read_json, write_csv, write_json
 from mute.support.errors import MuteError
@@ -63,8 +63,9 @@ class PaperArgs:
     """MUTE's policies; several are trainings of one recipe."""
     dreamwaq: tuple[Path, ...] = _that_ship("go1_dreamwaq")
     """DreamWaQ's; by default the one that ships, if one does."""
-    others: tuple[Path, ...] = ()
-    """Policies of further tasks to compare, under the tasks' names."""
+    others: tuple[str, ...] = ()
+    """Further policies to compare, NAME=FILE, several of one name being trainings of one recipe; a
+    FILE alone has the name of its task."""
     mpc: bool = True
     """Whether the model-predictive controller is compared."""
     parts: Words = PARTS
@@ -95,7 +96,7 @@ def paper(args: PaperArgs) -> None:
     _check(args)
     check_matplotlib()
     origin = sound_origin()
-    walkers = _walkers(args)
+    walkers = find_walkers(args.mute, args.dreamwaq, args.others, args.mpc)
     make_directory(args.out / "measured")
     torch.set_num_threads(1)  # the physics engine has the cores
     kept = Kept(args.out / "measured", origin)
@@ -128,47 +129,6 @@ def _check(args: PaperArgs) -> None:
             check_distinct(name, paths)
     if not args.mute:
         raise MuteError("--mute must name at least one policy, got none")
-
-
-def _walkers(args: PaperArgs) -> list[Walker]:
-    """Return what is compared, from loud to quiet as the paper has it.
-
-    Raises:
-        MuteError: If a policy cannot be used.
-    """
-    walkers = []
-    if args.mpc:
-        mpc = DriverArgs(controller="mpc")
-        origin = mpc.driver_origin()
-        walkers.append(Walker(MPC, mpc.driver(), origin["policy"], origin["policy_sha256"]))
-    named = [(DREAMWAQ, path) for path in args.dreamwaq] + [(MUTE, path) for path in args.mute]
-    for method, path in [*named, *(("", path) for path in args.others)]:
-        policy, origin = load_audible_policy(path), policy_origin(path)
-        walkers.append(
-            Walker(method or policy.task, policy, origin["policy"], origin["policy_sha256"])
-        )
-    _check_methods(walkers)
-    return walkers
-
-
-def _check_methods(walkers: Sequence[Walker]) -> None:
-    """Check that policies are of the methods that they are named for.
-
-    Raises:
-        MuteError: If one of MUTE's knows no quiet factor, one of DreamWaQ's does, or those of one
-            method are of several tasks.
-    """
-    for method, option, quiet in ((MUTE, "mute", True), (DREAMWAQ, "dreamwaq", False)):
-        own = [walker for walker in walkers if walker.method == method]
-        for walker in own:
-            if walker.driver.quiet_factor != quiet:
-                knows = "knows no" if quiet else "knows a"
-                raise MuteError(
-                    f"--{option} {walker.name} {knows} quiet factor; compare it by --others"
-                )
-        tasks = sorted({walker.driver.task for walker in own})
-        if len(tasks) > 1:
-            raise MuteError(f"--{option} must be trainings of one task, got {', '.join(tasks)}")
 
 
 def _measured(args: PaperArgs, wanted: Sequence[Job], kept: Kept) -> list[dict[str, Any]]:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from dreamwaq_helpers import write_dreamwaq_policy
 from places import SHIPPED_POLICY
+from policy_variants import write_variant
 
 from mute.command_lines import evaluate, evaluate_paper
 from mute.command_lines.card_comparison import comparison_report
@@ -127,19 +128,63 @@ def test_the_report_of_the_same_figures_is_the_same_byte_for_byte(tmp_path, meas
 
 
 def test_several_trainings_come_with_their_smallest_and_largest(tmp_path, measured):
-    copy = tmp_path / "copy.pt"
-    copy.write_bytes(SHIPPED_POLICY.read_bytes())
+    two = write_variant(tmp_path / "two.pt", seed=7)
     words = ["paper", "--no-mpc", "--parts", "levels", "--out", str(tmp_path / "out")]
-    assert evaluate.main([*words, "--mute", str(SHIPPED_POLICY), str(copy)]) == 0
+    assert evaluate.main([*words, "--mute", str(SHIPPED_POLICY), str(two)]) == 0
     report = (tmp_path / "out" / "comparison.md").read_text()
     assert "69.5 ± 0.4 (69.5, 69.5)" in report
     assert "their smallest and largest are in brackets" in report
 
 
-def test_other_tasks_are_compared_under_their_names(tmp_path, measured):
-    words = ["paper", "--no-mpc", "--parts", "levels", "--out", str(tmp_path)]
-    assert evaluate.main([*words, "--others", str(SHIPPED_POLICY)]) == 0
-    assert "go1_mute, beta 0" in {row["label"] for row in _found(tmp_path)["levels"]}
+def test_other_policies_are_compared_under_their_names_or_their_tasks(tmp_path, measured):
+    bare = write_variant(tmp_path / "a=b.pt", seed=7)  # no name: there is such a file
+    others = [f"No LSTM (history)={SHIPPED_POLICY}", str(bare)]
+    words = ["paper", "--no-mpc", "--parts", "levels", "--out", str(tmp_path / "out")]
+    assert evaluate.main([*words, "--others", *others]) == 0
+    found = _found(tmp_path / "out")
+    told = {row["label"] for row in found["levels"]}
+    assert {"No LSTM (history), beta 0", "go1_mute, beta 0", "MUTE, beta 0"} <= told
+    assert "'No LSTM (history)=" in found["command"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({}, "it is the same file, SHA-256 "),
+        ({"seed": 7, "symmetric": False}, "it has agent.symmetric False, not True"),
+        ({"action_scale": 0.3}, "it has env.action_scale 0.3, not 0.25"),
+        ({"gamma": 0.9}, "it has agent.ppo.gamma 0.9, not 0.99; compare it under a name of"),
+        ({"num_threads": 3}, "both are of seed "),
+        ({"seed": 7, "iteration": 9}, "it has last iteration 9, not 749"),
+    ],
+)
+@pytest.mark.parametrize("option", ["mute", "others"])
+def test_only_trainings_of_one_recipe_are_averaged(tmp_path, measured, option, changes, message):
+    other = write_variant(tmp_path / "other.pt", **changes)
+    if not changes:
+        other.write_bytes(SHIPPED_POLICY.read_bytes())
+    words = ["paper", "--no-mpc", "--out", str(tmp_path)]
+    name = "MUTE" if option == "mute" else "x"
+    files = [f"{'' if option == 'mute' else 'x='}{path}" for path in (SHIPPED_POLICY, other)]
+    with pytest.raises(MuteError) as error:
+        evaluate.main([*words, f"--{option}", *files])
+    assert f"{name}: " in str(error.value)
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+    assert measured == []
+
+
+@pytest.mark.parametrize("word", ["=a.pt", "a|b=a.pt", "a, beta 1=a.pt", "name="])
+def test_a_name_that_a_table_could_not_show_is_refused(tmp_path, measured, word):
+    with pytest.raises(MuteError, match=r"--others must be FILE or NAME=FILE, .*, got") as error:
+        evaluate.main(["paper", "--no-mpc", "--out", str(tmp_path), "--others", word])
+    assert repr(word) in str(error.value)
+
+
+def test_another_policy_cannot_have_the_name_of_a_method_of_the_paper(tmp_path, measured):
+    word = f"DreamWaQ={SHIPPED_POLICY}"
+    with pytest.raises(MuteError, match="--others must have names other than MPC, DreamWaQ and"):
+        evaluate.main(["paper", "--no-mpc", "--out", str(tmp_path), "--others", word])
 
 
 def test_a_floor_that_nothing_was_heard_on_has_no_level_and_no_figure(
