@@ -10,13 +10,15 @@ from mute.acoustics.soundscape import SOURCES
 from mute.command_lines.card_tables import markdown
 from mute.evaluation.comparison.conclusions import (
     EQUAL_SPEED,
+    MOST_FALLS,
     equal_speed_level,
     labels,
     level,
     papers_level,
-    verdicts,
+    walked,
 )
 from mute.evaluation.comparison.measurements import FLOORS_COMPARED
+from mute.evaluation.comparison.verdicts import verdicts
 from mute.evaluation.paper_levels import PAPER_WALK
 
 __all__ = ["comparison_report"]
@@ -91,8 +93,10 @@ def _levels_text(found: Mapping[str, Any]) -> str:
     )
     return (
         "MNL and PNL, asked for 0.5 m/s, with the standard deviation over robots; the paper's; and "
-        f"the difference.{over} The last column is the MNL at an *actual* {EQUAL_SPEED:g} m/s, "
-        "between what came out of other commands."
+        f"the difference.{over} Then the MNL at an *actual* {EQUAL_SPEED:g} m/s, between what came "
+        "out of other commands; the actual speed at this one; the robots that a level is of, which "
+        "leaves out those that kept falling; and how many fell, in bold where these are more than "
+        f"{100.0 * MOST_FALLS:.0f} %: such levels tell little."
     )
 
 
@@ -116,6 +120,9 @@ def _levels_table(rows: Sequence[Row]) -> str:
         "pnl_paper": ("paper", "{:.1f}"),
         "pnl_off": ("differs", "{:+.1f}"),
         "equal": ("MNL at equal speed", "{:.1f}"),
+        "speed": ("speed (m/s)", "{:.2f}"),
+        "heard": ("heard", "{}"),
+        "fell": ("fell", "{}"),
     }
     table = []
     for name in labels(rows):
@@ -125,8 +132,20 @@ def _levels_table(rows: Sequence[Row]) -> str:
             line["equal"] = None if math.isnan(equal) else equal
             for figure in ("mnl", "pnl"):
                 line |= _level_cells(rows, name, surface, figure)
-            table.append(line)
+            table.append(line | _walked_cells(rows, name, surface))
     return markdown(table, columns)
+
+
+def _walked_cells(rows: Sequence[Row], name: str, surface: str) -> dict[str, Any]:
+    found = walked(rows, name, surface, EQUAL_SPEED)
+    if found is None:
+        return dict.fromkeys(("speed", "heard", "fell"))
+    fell = f"{100.0 * found.fall_rate:.1f} %"
+    return {
+        "speed": None if math.isnan(found.speed) else found.speed,
+        "heard": f"{found.heard} of {found.trials}",
+        "fell": f"**{fell}**" if found.fall_rate > MOST_FALLS else fell,
+    }
 
 
 def _level_cells(rows: Sequence[Row], name: str, surface: str, figure: str) -> dict[str, Any]:

@@ -13,7 +13,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mute.acoustics.soundscape import SOURCES
-from mute.evaluation.comparison.conclusions import EQUAL_SPEED, labels, pareto_front
+from mute.evaluation.comparison.conclusions import (
+    EQUAL_SPEED,
+    MOST_FALLS,
+    falls_often,
+    labels,
+    pareto_front,
+)
 from mute.evaluation.noise_figures import save_figure
 from mute.evaluation.plotting import COLOURS, STYLE
 
@@ -45,11 +51,15 @@ def _draw_speeds(rows: Sequence[Row], directory: Path) -> list[Path]:
             speeds = [row["speed_mean"] for row in own]
             mnl = [row["mnl_mean"] for row in own]
             axes.plot(speeds, mnl, color=colour, marker="o", markersize=3.0, label=name)
+            fallen = [(row["speed_mean"], row["mnl_mean"]) for row in own if falls_often(row)]
+            axes.plot(
+                *_columns(fallen), linestyle="", marker="o", markersize=3.0, **_hollow(colour)
+            )
             pnl = [row["pnl_mean"] for row in own]
             axes.fill_between(speeds, mnl, pnl, color=colour, alpha=0.12, linewidth=0.0)
         axes.set_xlabel("actual speed (m/s)")
         axes.set_ylabel("level (dBA)")
-        axes.set_title("wood: MNL (line) to PNL (band), modelled", fontsize=9)
+        axes.set_title(f"wood: MNL (line) to PNL (band), modelled{_marked(rows)}", fontsize=9)
         axes.legend(frameon=False, fontsize=7)
         return save_figure(figure, directory / "speed")
 
@@ -83,13 +93,17 @@ def _draw_front(rows: Sequence[Row], directory: Path) -> list[Path]:
         figure, axes = _axes()
         points = []
         for colour, name in _coloured(rows):
-            own = [(row["speed_mean"], row["mnl_mean"]) for row in _heard(rows, name, "wood")]
-            points += own
-            axes.scatter(*zip(*own, strict=True), s=12.0, color=colour, label=name)
-        axes.plot(*zip(*pareto_front(points), strict=True), color="0.4", linewidth=0.8, zorder=0)
+            own = _heard(rows, name, "wood")
+            at = [(row["speed_mean"], row["mnl_mean"]) for row in own]
+            fell = [falls_often(row) for row in own]
+            points += [point for point, fallen in zip(at, fell, strict=True) if not fallen]
+            filled = ["none" if fallen else colour for fallen in fell]
+            axes.scatter(*_columns(at), s=12.0, facecolors=filled, edgecolors=colour, label=name)
+        axes.plot(*_columns(pareto_front(points)), color="0.4", linewidth=0.8, zorder=0)
         axes.set_xlabel("actual speed (m/s)")
         axes.set_ylabel("MNL (dBA)")
-        axes.set_title("wood, modelled: the line joins what nothing beats in both", fontsize=9)
+        title = "wood, modelled: the line joins what nothing beats in both"
+        axes.set_title(title + _marked(rows), fontsize=9)
         axes.legend(frameon=False, fontsize=7)
         return save_figure(figure, directory / "front")
 
@@ -117,6 +131,21 @@ _LOWEST = 30.0
 """Level that bars stand on, dBA."""
 
 
+def _columns(points: Sequence[tuple[float, float]]) -> tuple[list[float], list[float]]:
+    return [speed for speed, _ in points], [loudness for _, loudness in points]
+
+
+def _hollow(colour: str) -> dict[str, Any]:
+    return {"markerfacecolor": "white", "markeredgecolor": colour}
+
+
+def _marked(rows: Sequence[Row]) -> str:
+    """Return what a title says of the settings on wood that many robots fell in, if any."""
+    if not any(falls_often(row) for row in rows if row["surface"] == "wood"):
+        return ""
+    return f"\nhollow: more than {100.0 * MOST_FALLS:.0f} % of the robots fell"
+
+
 def _axes() -> tuple[Figure, Axes]:
     figure = Figure(figsize=(5.6, 3.6), layout="constrained")
     return figure, figure.subplots()
@@ -139,7 +168,7 @@ def _heard(rows: Sequence[Row], name: str, surface: str) -> list[Row]:
 
 def _mean_over_trainings(rows: Sequence[Row], key: str) -> list[dict[str, float]]:
     """Return rows that are equal in a key as one, with the means of what figures show."""
-    shown = ("speed_mean", "mnl_mean", "pnl_mean", "velocity_error_sq")
+    shown = ("speed_mean", "mnl_mean", "pnl_mean", "velocity_error_sq", "fall_rate")
     return [
         {key: value}
         | {name: statistics.fmean(row[name] for row in rows if row[key] == value) for name in shown}
