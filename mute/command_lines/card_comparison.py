@@ -17,11 +17,11 @@ from mute.evaluation.comparison.conclusions import (
     papers_level,
     walked,
 )
-from mute.evaluation.comparison.measurements import FLOORS_COMPARED
+from mute.evaluation.comparison.measurements import FLOORS_COMPARED, MADE_WITH
 from mute.evaluation.comparison.verdicts import verdicts
 from mute.evaluation.paper_levels import PAPER_WALK
 
-__all__ = ["comparison_report"]
+__all__ = ["comparison_report", "measured_before"]
 
 Row = Mapping[str, Any]
 
@@ -60,8 +60,31 @@ def _head(found: Mapping[str, Any]) -> str:
         "Every level is modelled and dBA at the trunk; nothing was measured on a real robot."
         f"{quick} {found['trials']} robots a setting, {found['seconds']:g} s each, seed "
         f"{found['seed']}; they differ and see with noise. Commit {found['commit']}, calibration "
-        f"{found['calibration_sha256'][:12]}, on {found['machine']}."
+        f"{found['calibration_sha256'][:12]}, on {found['machine']}.{_before(found)}"
     )
+
+
+def _before(found: Mapping[str, Any]) -> str:
+    others = measured_before(found)
+    return f" Measured before: {'; '.join(others)}." if others else ""
+
+
+def measured_before(found: Mapping[str, Any]) -> list[str]:
+    """Return what was measured with another commit or machine than the rest, a line for each."""
+    made_with = {name: found[name] for name in MADE_WITH}
+    counts: dict[tuple[str, ...], int] = {}
+    for row in (*found["levels"], *found["sweep"]):
+        if {name: row[name] for name in MADE_WITH} != made_with:
+            at = tuple(row[name] for name in MADE_WITH)
+            counts[at] = counts.get(at, 0) + 1
+    told = [
+        f"{count} setting{'s' * (count > 1)} at commit {commit} on {machine}"
+        for (commit, machine), count in counts.items()
+    ]
+    walk = found["walk"]
+    if walk is not None and {name: walk[name] for name in MADE_WITH} != made_with:
+        told.append(f"the long walk at commit {walk['commit']} on {walk['machine']}")
+    return told
 
 
 def _walkers_table(walkers: Sequence[Row]) -> str:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 import shlex
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import torch
 
-from mute.acoustics.origin import policy_origin, sound_origin
+from mute.acoustics.origin import sound_origin
 from mute.command_lines.arguments import (
     Words,
     check_betas,
@@ -22,17 +20,17 @@ from mute.command_lines.arguments import (
     make_directory,
 )
 from mute.command_lines.card_comparison import comparison_report
-from mute.command_lines.evaluate_walk import WalkArgs, walk
+from mute.command_lines.evaluate_walk import WalkArgs
+from mute.command_lines.paper_measurements import measured_rows, tell_of_others, walked_folder
 from mute.command_lines.paper_walkers import find_walkers
-from mute.command_lines.sound_options import progress_bar, tell
-from mute.evaluation.comparison.measurements import FULL, QUICK, Extent, Job, Kept, jobs, measure
+from mute.command_lines.sound_options import tell
+from mute.evaluation.comparison.measurements import DIRTY, FULL, QUICK, Extent, Kept, jobs
 from mute.evaluation.comparison.walkers import Walker
 from mute.evaluation.plotting import check_matplotlib
 from mute.evaluation.tables import print_table, read_json, write_csv, write_json
 from mute.support.errors import MuteError
 from mute.support.files import write_file
 from mute.support.plain_data import without_nan
-from mute.support.provenance import digest_of, file_sha256
 from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK
@@ -74,6 +72,8 @@ class PaperArgs:
     """Quiet factor of the long walk."""
     trials: int | None = None
     """Robots for each setting; the paper's 20 unless given, 2 with --quick."""
+    anew: bool = False
+    """Measure all again, whatever is kept."""
     quick: bool = False
     """As little of everything as shows that it works."""
     seed: int = 1
@@ -99,9 +99,12 @@ def paper(args: PaperArgs) -> None:
     walkers = find_walkers(args.mute, args.dreamwaq, args.others, args.mpc)
     make_directory(args.out / "measured")
     torch.set_num_threads(1)  # the physics engine has the cores
+    if origin["commit"].endswith(DIRTY):
+        tell("the working tree differs from its commit: what is measured now is not taken again")
     kept = Kept(args.out / "measured", origin)
-    rows = _measured(args, jobs(walkers, args.extent, args.parts), kept)
-    walked = _walked(args, origin) if "walk" in args.parts else None
+    wanted = jobs(walkers, args.extent, args.parts)
+    rows = measured_rows(wanted, args.extent, args.seed, kept, args.anew)
+    walked = walked_folder(_walk(args), origin, args.anew) if "walk" in args.parts else None
     found: dict[str, Any] = {
         "command": _command(args),
         "quick": args.quick,
@@ -114,7 +117,20 @@ def paper(args: PaperArgs) -> None:
         "sweep": [row for row in rows if row["part"] == "sweep"],
         "walk": None if walked is None else read_json(walked / "walk.json"),
     }
+    tell_of_others(found)
     _report(args, without_nan(found), walked)
+
+
+def _walk(args: PaperArgs) -> WalkArgs:
+    """Return the long walk: of the first of MUTE's policies."""
+    return WalkArgs(
+        policy=args.mute[0],
+        course=_COURSES / ("short.yaml" if args.quick else "office.yaml"),
+        beta=args.beta,
+        trials=args.extent.walk_trials,
+        seed=args.seed,
+        out=args.out / "walks",
+    )
 
 
 def _check(args: PaperArgs) -> None:
@@ -129,56 +145,6 @@ def _check(args: PaperArgs) -> None:
             check_distinct(name, paths)
     if not args.mute:
         raise MuteError("--mute must name at least one policy, got none")
-
-
-def _measured(args: PaperArgs, wanted: Sequence[Job], kept: Kept) -> list[dict[str, Any]]:
-    """Return the rows of all jobs, those read back that were measured before."""
-    extent = args.extent
-    asked = [kept.asked(job, extent, args.seed) for job in wanted]
-    known = [kept.read(each) for each in asked]
-    left = sum(job.steps(extent) for job, rows in zip(wanted, known, strict=True) if rows is None)
-    done = itertools.count(1)
-    rows: list[dict[str, Any]] = []
-    with progress_bar("levels", max(left, 1)) as advance:
-        for job, each, before in zip(wanted, asked, known, strict=True):
-            if before is None:
-                measured = measure(job, extent, args.seed, lambda: advance(next(done)))
-                kept.write(each, measured)
-                rows += without_nan(measured)
-            else:
-                rows += [row | {"policy": job.walker.name} for row in before]
-    return rows
-
-
-def _walked(args: PaperArgs, origin: Mapping[str, str]) -> Path:
-    """Return the folder of the long walk of the first of MUTE's policies, made before or now."""
-    policy = args.mute[0]
-    course = _COURSES / ("short.yaml" if args.quick else "office.yaml")
-    trials = args.extent.walk_trials
-    asked = {
-        **policy_origin(policy),
-        **origin,
-        "course_sha256": file_sha256(course),
-        "beta": args.beta,
-        "seed": args.seed,
-        "trials": trials,
-    }
-    del asked["policy"]  # wherever the same file lies
-    folder = args.out / "walks" / digest_of(asked)
-    done = folder / "done"  # what is there without was stopped
-    if not done.is_file():
-        walk(
-            WalkArgs(
-                policy=policy,
-                course=course,
-                beta=args.beta,
-                trials=trials,
-                seed=args.seed,
-                out=folder,
-            )
-        )
-        write_file(done, b"")
-    return folder
 
 
 def _about(walker: Walker) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,8 @@ from dreamwaq_helpers import write_dreamwaq_policy
 from places import SHIPPED_POLICY
 from policy_variants import write_variant
 
-from mute.command_lines import evaluate, evaluate_paper
+from mute.acoustics import origin
+from mute.command_lines import evaluate, paper_measurements
 from mute.command_lines.card_comparison import comparison_report
 from mute.support.errors import MuteError
 
@@ -41,6 +43,17 @@ def _row(label: str, part: str, surface: str, beta: float, speed: float) -> dict
     } | {f"laeq_{source}": 50.0 + index for index, source in enumerate(_SOURCES)}
 
 
+@pytest.fixture(autouse=True)
+def at_commit(monkeypatch) -> Callable[[str], None]:
+    """Let the tree be at a commit, a clean one to begin with; return what changes it."""
+
+    def change(commit: str) -> None:
+        monkeypatch.setattr(origin, "current_commit", lambda: commit)
+
+    change("a" * 40)
+    return change
+
+
 @pytest.fixture
 def measured(monkeypatch) -> list[str]:
     """Take the place of the measurements; return what was measured, in order."""
@@ -53,7 +66,7 @@ def measured(monkeypatch) -> list[str]:
             for each in job.settings
         ]
 
-    monkeypatch.setattr(evaluate_paper, "measure", measure)
+    monkeypatch.setattr(paper_measurements, "measure", measure)
     return done
 
 
@@ -86,42 +99,107 @@ def test_all_of_it_really_runs_in_small_and_is_read_back_the_second_time(
     def never(*_: Any) -> None:
         raise AssertionError("measured again")
 
-    monkeypatch.setattr(evaluate_paper, "measure", never)
-    monkeypatch.setattr(evaluate_paper, "walk", never)
+    monkeypatch.setattr(paper_measurements, "measure", never)
+    monkeypatch.setattr(paper_measurements, "walk", never)
     assert evaluate.main(words) == 0
     assert (tmp_path / "comparison.md").read_text() == report
 
 
 def test_what_was_stopped_goes_on_where_it_was(tmp_path, measured, monkeypatch):
     words = ["paper", "--parts", "levels,sweep", "--out", str(tmp_path)]
-    measure = evaluate_paper.measure
+    measure = paper_measurements.measure
 
     def stopped(job, *rest: Any) -> list[dict[str, Any]]:
         if len(measured) == 2:
             raise KeyboardInterrupt
         return measure(job, *rest)
 
-    monkeypatch.setattr(evaluate_paper, "measure", stopped)
+    monkeypatch.setattr(paper_measurements, "measure", stopped)
     with pytest.raises(KeyboardInterrupt):
         evaluate.main(words)
     assert not (tmp_path / "comparison.json").exists()
     first = list(measured)
-    monkeypatch.setattr(evaluate_paper, "measure", measure)
+    monkeypatch.setattr(paper_measurements, "measure", measure)
     assert evaluate.main(words) == 0
     assert measured[:2] == first == ["levels MPC wood", "levels MPC carpet"]
     assert len(set(measured)) == len(measured)  # none twice
     assert measured[-1] == "sweep MUTE wood"
 
 
-def test_the_report_of_the_same_figures_is_the_same_byte_for_byte(tmp_path, measured):
+@pytest.fixture
+def walked(monkeypatch) -> list[tuple[Path, float]]:
+    """Take the place of the long walk; return its folders and quiet factors, in order."""
+    done: list[tuple[Path, float]] = []
+
+    def walk(asked) -> None:
+        done.append((asked.out, asked.beta))
+        asked.out.mkdir(parents=True, exist_ok=True)
+        figures = {"mnl_mean": 66.0, "pnl_mean": 70.0, "arrived": 1, "trials": 1, "end": "fell"}
+        figures |= {"path_length": 3.0, "course_speed": 0.5, "beta": asked.beta, "seconds": 9.0}
+        (asked.out / "walk.json").write_text(json.dumps(figures | origin.sound_origin()))
+        (asked.out / "course_map.png").write_bytes(b"a map")
+
+    monkeypatch.setattr(paper_measurements, "walk", walk)
+    return done
+
+
+def test_what_another_commit_measured_is_taken_with_a_note_or_measured_anew(
+    tmp_path, measured, walked, at_commit, capsys
+):
+    words = ["paper", "--no-mpc", "--parts", "levels,walk", "--out", str(tmp_path)]
+    assert evaluate.main(words) == 0
+    report = tmp_path / "comparison.md"
+    assert "Measured before" not in report.read_text()
+    assert "Commit " + "a" * 40 in report.read_text()
+    at_commit("b" * 40)
+    capsys.readouterr()
+    assert evaluate.main(words) == 0
+    assert (len(measured), len(walked)) == (3, 1)
+    machine = _found(tmp_path)["machine"]
+    # 3 quiet factors at 7, 5 and 5 speeds.
+    note = f"51 settings at commit {'a' * 40} on {machine}; the long walk at commit {'a' * 40} on "
+    assert f"Measured before: {note}{machine}." in report.read_text()
+    told = capsys.readouterr().err
+    assert f"measured before: {note}{machine}; --anew measures all again" in told
+    assert {row["commit"] for row in _found(tmp_path)["levels"]} == {"a" * 40}
+    assert evaluate.main([*words, "--anew"]) == 0
+    assert (len(measured), len(walked)) == (6, 2)
+    assert "Measured before" not in report.read_text()
+    assert {row["commit"] for row in _found(tmp_path)["levels"]} == {"b" * 40}
+
+
+def test_what_a_tree_with_changes_measured_is_never_taken_again(
+    tmp_path, measured, walked, at_commit, capsys
+):
+    words = ["paper", "--no-mpc", "--parts", "levels,walk", "--out", str(tmp_path)]
+    at_commit("a" * 40 + "-dirty")
+    for count in (1, 2):
+        assert evaluate.main(words) == 0
+        assert (len(measured), len(walked)) == (3 * count, count)
+        assert "what is measured now is not taken again" in capsys.readouterr().err
+    at_commit("a" * 40)
+    assert evaluate.main(words) == 0
+    assert (len(measured), len(walked)) == (9, 3)
+    # Nor does it take the place of what was measured without changes.
+    at_commit("b" * 40 + "-dirty")
+    assert evaluate.main([*words, "--anew"]) == 0
+    assert evaluate.main(words) == 0
+    assert (len(measured), len(walked)) == (12, 4)
+    assert {row["commit"] for row in _found(tmp_path)["levels"]} == {"a" * 40}
+    assert _found(tmp_path)["walk"]["commit"] == "a" * 40
+
+
+def test_the_report_of_the_same_figures_is_the_same_byte_for_byte(tmp_path, measured, walked):
     dreamwaq = write_dreamwaq_policy(tmp_path / "dreamwaq.pt")
     for name in ("one", "two"):
-        words = ["paper", "--parts", "levels,sweep", "--out", str(tmp_path / name)]
-        assert evaluate.main([*words, "--dreamwaq", str(dreamwaq)]) == 0
+        words = ["paper", "--dreamwaq", str(dreamwaq), "--out", str(tmp_path / name)]
+        assert evaluate.main(words) == 0
     one, two = (tmp_path / name for name in ("one", "two"))
     for name in ("comparison.md", "comparison.json", "levels.csv", "speed.png", "front.svg"):
         assert (one / name).read_bytes() == (two / name).read_bytes()
     report = (one / "comparison.md").read_text()
+    assert "1 of 1 robots arrived; MNL 66.0 dBA" in report
+    assert f"({walked[0][0].relative_to(one)}/course_map.png)" in report
     # 69 dBA and half a dBA for the speed; the paper's 68.61.
     assert "| MUTE, beta 0 | wood | 69.5 ± 0.4 | 68.6 | +0.9 |" in report
     assert "| DreamWaQ | tile | 72.5 ± 0.4 | 72.3 | +0.2 |" in report
@@ -195,13 +273,13 @@ def test_another_policy_cannot_have_the_name_of_a_method_of_the_paper(tmp_path, 
 def test_a_floor_that_nothing_was_heard_on_has_no_level_and_no_figure(
     tmp_path, measured, monkeypatch
 ):
-    measure = evaluate_paper.measure
+    measure = paper_measurements.measure
     unheard = dict.fromkeys(("mnl_mean", "mnl_std", "pnl_mean", "pnl_std"), None)
 
     def silent(*asked: Any) -> list[dict[str, Any]]:
         return [row | unheard for row in measure(*asked)]
 
-    monkeypatch.setattr(evaluate_paper, "measure", silent)
+    monkeypatch.setattr(paper_measurements, "measure", silent)
     words = ["paper", "--no-mpc", "--parts", "levels,sweep", "--out", str(tmp_path)]
     assert evaluate.main(words) == 0
     assert _found(tmp_path)["figures"] == []
@@ -218,17 +296,7 @@ def test_a_policy_is_refused_under_the_name_of_another_method(tmp_path, measured
     assert measured == []
 
 
-def test_two_walks_that_differ_are_both_kept(tmp_path, monkeypatch):
-    walked: list[tuple[Path, float]] = []
-
-    def walk(asked) -> None:
-        walked.append((asked.out, asked.beta))
-        asked.out.mkdir(parents=True)
-        figures = {"mnl_mean": 66.0, "pnl_mean": 70.0, "arrived": 1, "trials": 1, "end": "fell"}
-        figures |= {"path_length": 3.0, "course_speed": 0.5, "beta": asked.beta, "seconds": 9.0}
-        (asked.out / "walk.json").write_text(json.dumps(figures))
-
-    monkeypatch.setattr(evaluate_paper, "walk", walk)
+def test_two_walks_that_differ_are_both_kept(tmp_path, walked):
     words = ["paper", "--quick", "--no-mpc", "--parts", "walk", "--out", str(tmp_path)]
     for beta in ("0.5", "1", "0.5"):
         assert evaluate.main([*words, "--beta", beta]) == 0
