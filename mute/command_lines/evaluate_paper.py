@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,12 @@ from mute.command_lines.arguments import (
 )
 from mute.command_lines.card_comparison import comparison_report
 from mute.command_lines.evaluate_walk import WalkArgs
-from mute.command_lines.paper_measurements import measured_rows, tell_of_others, walked_folder
+from mute.command_lines.paper_measurements import (
+    kept_walk,
+    measured_rows,
+    tell_of_others,
+    walked_folder,
+)
 from mute.command_lines.paper_walkers import find_walkers
 from mute.command_lines.sound_options import tell
 from mute.evaluation.comparison.measurements import DIRTY, FULL, QUICK, Extent, Kept, jobs
@@ -102,11 +108,13 @@ def paper(args: PaperArgs) -> None:
     if origin["commit"].endswith(DIRTY):
         tell("the working tree differs from its commit: what is measured now is not taken again")
     kept = Kept(args.out / "measured", origin)
-    wanted = jobs(walkers, args.extent, args.parts)
-    rows = measured_rows(wanted, args.extent, args.seed, kept, args.anew)
-    walked = walked_folder(_walk(args), origin, args.anew) if "walk" in args.parts else None
+    # A part alone leaves the others in the report, where they are measured already.
+    wanted = jobs(walkers, args.extent, PARTS)
+    rows = measured_rows(wanted, args.parts, args.extent, args.seed, kept, args.anew)
+    asked, walks = _walk(args), "walk" in args.parts
+    walked = walked_folder(asked, origin, args.anew) if walks else kept_walk(asked, origin)
     found: dict[str, Any] = {
-        "command": _command(args),
+        "command": _command(args, _told(args, rows, walked)),
         "quick": args.quick,
         "trials": args.extent.trials,
         "seconds": args.extent.seconds,
@@ -119,6 +127,12 @@ def paper(args: PaperArgs) -> None:
     }
     tell_of_others(found)
     _report(args, without_nan(found), walked)
+
+
+def _told(args: PaperArgs, rows: Sequence[Mapping[str, Any]], walked: Path | None) -> Words:
+    """Return the parts that the report tells of."""
+    known = {*args.parts, *(row["part"] for row in rows)} | ({"walk"} if walked else set())
+    return tuple(part for part in PARTS if part in known)
 
 
 def _walk(args: PaperArgs) -> WalkArgs:
@@ -158,12 +172,12 @@ def _about(walker: Walker) -> dict[str, Any]:
     }
 
 
-def _command(args: PaperArgs) -> str:
-    """Return the command that measures the same again."""
+def _command(args: PaperArgs, parts: Words) -> str:
+    """Return the command that measures these parts again."""
     words = ["python", "evaluate.py", "paper"]
     default = PaperArgs()
     for name in ("mute", "dreamwaq", "others", "parts"):
-        values = getattr(args, name)
+        values = parts if name == "parts" else getattr(args, name)
         if values != getattr(default, name):
             words += [f"--{name}", *map(str, values)]
     for name in ("beta", "trials", "seed"):

@@ -17,31 +17,36 @@ from mute.support.files import write_file
 from mute.support.plain_data import without_nan
 from mute.support.provenance import digest_of, file_sha256
 
-__all__ = ["measured_rows", "tell_of_others", "walked_folder"]
+__all__ = ["kept_walk", "measured_rows", "tell_of_others", "walked_folder"]
 
 
 def measured_rows(
-    wanted: Sequence[Job], extent: Extent, seed: int, kept: Kept, anew: bool
+    wanted: Sequence[Job], parts: Sequence[str], extent: Extent, seed: int, kept: Kept, anew: bool
 ) -> list[dict[str, Any]]:
     """Return the rows of all jobs, those read back that were measured before.
 
     Args:
-        wanted: What to measure.
+        wanted: What is compared, of all parts.
+        parts: What to measure of it; of other parts, what is there whole is read back.
         extent: How much of it.
         seed: Seed of the robots, of initial states and of the noise.
         kept: What was measured before, and where what is measured now goes.
-        anew: Whether to read nothing back.
+        anew: Whether to measure what is there, too.
     """
     asked = [kept.asked(job, extent, seed) for job in wanted]
     known = [
-        None if anew else kept.read(each, job.walker)
+        None if anew and job.part in parts else kept.read(each, job.walker)
         for job, each in zip(wanted, asked, strict=True)
     ]
-    left = sum(job.steps(extent) for job, rows in zip(wanted, known, strict=True) if rows is None)
+    missing = [job for job, rows in zip(wanted, known, strict=True) if rows is None]
+    left_out = {job.part for job in missing if job.part not in parts}
+    left = sum(job.steps(extent) for job in missing if job.part in parts)
     done = itertools.count(1)
     rows: list[dict[str, Any]] = []
     with progress_bar("levels", max(left, 1)) as advance:
         for job, each, before in zip(wanted, asked, known, strict=True):
+            if job.part in left_out:
+                continue
             if before is None:
                 measured = measure(job, extent, seed, lambda: advance(next(done)))
                 before = without_nan(kept.write(each, measured))
@@ -57,21 +62,12 @@ def walked_folder(asked: WalkArgs, origin: Mapping[str, str], anew: bool) -> Pat
         origin: What it rests on if it is made now, see `sound_origin`.
         anew: Whether to make it again.
     """
-    digest = digest_of(
-        {
-            "policy_sha256": policy_origin(asked.policy)["policy_sha256"],
-            "calibration_sha256": origin["calibration_sha256"],
-            "course_sha256": file_sha256(asked.course),
-            "beta": asked.beta,
-            "seed": asked.seed,
-            "trials": asked.trials,
-        }
-    )
-    folder = asked.out / digest
-    if not anew and _is_whole(folder):
-        return folder
+    before = None if anew else kept_walk(asked, origin)
+    if before is not None:
+        return before
+    folder = _folder(asked, origin)
     if origin["commit"].endswith(DIRTY):
-        folder = folder.with_name(digest + DIRTY)
+        folder = folder.with_name(folder.name + DIRTY)
     done = folder / _DONE
     done.unlink(missing_ok=True)
     walk(dataclasses.replace(asked, out=folder))
@@ -79,12 +75,26 @@ def walked_folder(asked: WalkArgs, origin: Mapping[str, str], anew: bool) -> Pat
     return folder
 
 
+def kept_walk(asked: WalkArgs, origin: Mapping[str, str]) -> Path | None:
+    """Return the folder of a long walk that was made before; None if it was not, or not whole."""
+    folder = _folder(asked, origin)
+    return folder if (folder / _DONE).is_file() else None
+
+
+def _folder(asked: WalkArgs, origin: Mapping[str, str]) -> Path:
+    decisive = {
+        "policy_sha256": policy_origin(asked.policy)["policy_sha256"],
+        "calibration_sha256": origin["calibration_sha256"],
+        "course_sha256": file_sha256(asked.course),
+        "beta": asked.beta,
+        "seed": asked.seed,
+        "trials": asked.trials,
+    }
+    return asked.out / digest_of(decisive)
+
+
 _DONE = "done"
 """File in the folder of a walk; what is there without was stopped."""
-
-
-def _is_whole(folder: Path) -> bool:
-    return (folder / _DONE).is_file()
 
 
 def tell_of_others(found: Mapping[str, Any]) -> None:

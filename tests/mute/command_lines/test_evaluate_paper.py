@@ -63,6 +63,7 @@ def measured(monkeypatch) -> list[str]:
         done.append(f"{job.part} {job.walker.method} {job.surface}")
         return [
             _row(job.walker.label(each.beta), job.part, job.surface, each.beta, each.command_speed)
+            | {"policy": job.walker.name}
             for each in job.settings
         ]
 
@@ -187,6 +188,47 @@ def test_what_a_tree_with_changes_measured_is_never_taken_again(
     assert (len(measured), len(walked)) == (12, 4)
     assert {row["commit"] for row in _found(tmp_path)["levels"]} == {"a" * 40}
     assert _found(tmp_path)["walk"]["commit"] == "a" * 40
+
+
+def test_a_part_alone_leaves_the_others_in_the_report(tmp_path, measured, walked):
+    words = ["paper", "--no-mpc", "--out", str(tmp_path)]
+    assert evaluate.main(words) == 0
+    report, found = (tmp_path / "comparison.md").read_text(), _found(tmp_path)
+    for part in ("sweep", "walk", "levels"):
+        before = len(measured), len(walked)
+        assert evaluate.main([*words, "--parts", part]) == 0
+        assert (len(measured), len(walked)) == before
+        assert (tmp_path / "comparison.md").read_text() == report
+        assert _found(tmp_path) == found
+    # Measured anew is what is asked for, and no more.
+    assert evaluate.main([*words, "--parts", "sweep", "--anew"]) == 0
+    assert measured[4:] == ["sweep MUTE wood"]
+    assert _found(tmp_path) == found
+
+
+def test_parts_of_other_settings_or_not_whole_are_not_in_the_report(
+    tmp_path, measured, walked, monkeypatch
+):
+    words = ["paper", "--no-mpc", "--out", str(tmp_path)]
+    measure = paper_measurements.measure
+
+    def stopped(job, *rest: Any) -> list[dict[str, Any]]:
+        if len(measured) == 2:
+            raise KeyboardInterrupt
+        return measure(job, *rest)
+
+    monkeypatch.setattr(paper_measurements, "measure", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate.main(words)
+    monkeypatch.setattr(paper_measurements, "measure", measure)
+    assert evaluate.main([*words, "--parts", "sweep"]) == 0
+    assert (_found(tmp_path)["levels"], _found(tmp_path)["walk"]) == ([], None)
+    assert evaluate.main([*words, "--parts", "levels,walk"]) == 0
+    assert len(_found(tmp_path)["sweep"]) == 11
+    assert evaluate.main([*words, "--parts", "walk", "--seed", "2"]) == 0
+    found = _found(tmp_path)
+    assert (found["levels"], found["sweep"]) == ([], [])
+    assert found["command"].endswith("--parts walk --seed 2 --no-mpc")
 
 
 def test_the_report_of_the_same_figures_is_the_same_byte_for_byte(tmp_path, measured, walked):
