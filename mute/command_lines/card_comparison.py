@@ -34,11 +34,13 @@ def comparison_report(found: Mapping[str, Any]) -> str:
     """
     rows, sweep, walk = found["levels"], found["sweep"], found["walk"]
     parts = [_head(found), _walkers_table(found["walkers"])]
-    told = verdicts(rows, sweep, walk)
+    fitted = _fitted_cell(found)
+    parts += ["## The constant", _constant_text(found["calibration"])]
+    told = verdicts(rows, sweep, walk, fitted)
     if told:
         parts += ["## What the paper found, here", _verdicts_table(told)]
     if rows:
-        parts += ["## Levels at 0.5 m/s", _levels_text(found), _levels_table(rows)]
+        parts += ["## Levels at 0.5 m/s", _levels_text(found), _levels_table(rows, fitted)]
         parts += ["## Where the noise comes from", _sources_table(rows)]
     if sweep:
         parts += ["## The quiet factor", _sweep_table(sweep)]
@@ -73,7 +75,7 @@ def measured_before(found: Mapping[str, Any]) -> list[str]:
     """Return what was measured with another commit or machine than the rest, a line for each."""
     made_with = {name: found[name] for name in MADE_WITH}
     counts: dict[tuple[str, ...], int] = {}
-    for row in (*found["levels"], *found["sweep"]):
+    for row in (*found["calibration"]["fits"], *found["levels"], *found["sweep"]):
         if {name: row[name] for name in MADE_WITH} != made_with:
             at = tuple(row[name] for name in MADE_WITH)
             counts[at] = counts.get(at, 0) + 1
@@ -96,6 +98,52 @@ def _walkers_table(walkers: Sequence[Row]) -> str:
         "digest": ("SHA-256", "{}"),
     }
     return markdown([dict(row) | {"digest": row["sha256"][:12]} for row in walkers], columns)
+
+
+def _fitted_cell(found: Mapping[str, Any]) -> tuple[str, str] | None:
+    """Return the label and the floor whose level is fitted; None if the calibration tells none."""
+    used = found["calibration"]["in_use"]
+    known = used["label"] is not None and used["floor"] is not None
+    return (used["label"], used["floor"]) if known else None
+
+
+def _constant_text(calibration: Mapping[str, Any]) -> str:
+    used, fits = calibration["in_use"], calibration["fits"]
+    share = used["transmissibility"]
+    to_what = (
+        "what it is fitted to, its file does not say."
+        if used["label"] is None or used["floor"] is None
+        else f"fitted such that {used['label']} has the paper's MNL on {used['floor']} at "
+        f"{EQUAL_SPEED:g} m/s{_with_policy(used)}. That level is marked in the table, and counts "
+        "nowhere as predicted; all else is."
+    )
+    text = f"Of a force at a foot, the share {share:.4f} comes to the robot's shell: {to_what}"
+    if not fits:
+        return text
+    shown = [fit | {"beside": _decibels(fit, share), "ci": fit["mnl_ci95"]} for fit in fits]
+    columns = {
+        "policy": ("policy", "{}"),
+        "training_seed": ("seed", "{}"),
+        "transmissibility": ("share", "{:.4f}"),
+        "beside": ("beside that in use (dB)", "{:+.1f}"),
+        "ci": ("MNL known within (dB)", "± {:.1f}"),
+        "reason": ("why there is none", "{}"),
+    }
+    return (
+        f"{text}\n\nThis share would give {fits[0]['label']} the paper's MNL on wood; nothing here "
+        f"uses it.\n\n{markdown(shown, columns)}"
+    )
+
+
+def _with_policy(used: Mapping[str, Any]) -> str:
+    digest = used["policy_sha256"]
+    return "" if digest is None else f" with the policy of SHA-256 {digest[:12]}"
+
+
+def _decibels(fit: Row, share: float) -> float | None:
+    if fit["transmissibility"] is None or share <= 0.0:
+        return None
+    return 20.0 * math.log10(fit["transmissibility"] / share)
 
 
 def _verdicts_table(told: Sequence[Any]) -> str:
@@ -132,7 +180,7 @@ def _table_levels(rows: Sequence[Row]) -> list[Any]:
     return [one for one in every if one is not None]
 
 
-def _levels_table(rows: Sequence[Row]) -> str:
+def _levels_table(rows: Sequence[Row], fitted: tuple[str, str] | None) -> str:
     columns = {
         "label": ("method", "{}"),
         "surface": ("floor", "{}"),
@@ -155,6 +203,8 @@ def _levels_table(rows: Sequence[Row]) -> str:
             line["equal"] = None if math.isnan(equal) else equal
             for figure in ("mnl", "pnl"):
                 line |= _level_cells(rows, name, surface, figure)
+            if (name, surface) == fitted and line["mnl"] is not None:
+                line["mnl"] += " (fitted)"
             table.append(line | _walked_cells(rows, name, surface))
     return markdown(table, columns)
 

@@ -22,6 +22,7 @@ from mute.command_lines.arguments import (
 )
 from mute.command_lines.card_comparison import comparison_report
 from mute.command_lines.evaluate_walk import WalkArgs
+from mute.command_lines.paper_calibration import constant_in_use, dreamwaqs_constants
 from mute.command_lines.paper_measurements import (
     kept_walk,
     measured_rows,
@@ -43,7 +44,7 @@ from mute.tasks import DEFAULT_TASK
 
 __all__ = ["PARTS", "PaperArgs", "paper"]
 
-PARTS = ("levels", "sweep", "walk")
+PARTS = ("calibration", "levels", "sweep", "walk")
 """What the comparison is made of."""
 
 _POLICIES = RESOURCES / "go1"
@@ -59,8 +60,9 @@ def _that_ship(task: str) -> tuple[Path, ...]:
 class PaperArgs:
     """Every experiment of the paper, in simulation, with a report.
 
-    Levels of all methods on wood, carpet and tile at several speeds, the quiet factor, and the long
-    walk. What has been measured is kept, and read back where the command is run again.
+    The constant that DreamWaQ would give, levels of all methods on wood, carpet and tile at several
+    speeds, the quiet factor, and the long walk. What has been measured is kept, and read back where
+    the command is run again.
     """
 
     mute: tuple[Path, ...] = _that_ship(DEFAULT_TASK)
@@ -73,7 +75,8 @@ class PaperArgs:
     mpc: bool = True
     """Whether the model-predictive controller is compared."""
     parts: Words = PARTS
-    """What to measure: levels, sweep (of the quiet factor), walk."""
+    """What to measure: calibration (the constant that DreamWaQ on wood would give), levels, sweep
+    (of the quiet factor), walk."""
     beta: float = 0.5
     """Quiet factor of the long walk."""
     trials: int | None = None
@@ -109,17 +112,21 @@ def paper(args: PaperArgs) -> None:
         tell("the working tree differs from its commit: what is measured now is not taken again")
     kept = Kept(args.out / "measured", origin)
     # A part alone leaves the others in the report, where they are measured already.
+    fits = dreamwaqs_constants(
+        walkers, args.extent, args.seed, kept, "calibration" in args.parts, args.anew
+    )
     wanted = jobs(walkers, args.extent, PARTS)
     rows = measured_rows(wanted, args.parts, args.extent, args.seed, kept, args.anew)
     asked, walks = _walk(args), "walk" in args.parts
     walked = walked_folder(asked, origin, args.anew) if walks else kept_walk(asked, origin)
     found: dict[str, Any] = {
-        "command": _command(args, _told(args, rows, walked)),
+        "command": _command(args, _told(args, [*fits, *rows], walked)),
         "quick": args.quick,
         "trials": args.extent.trials,
         "seconds": args.extent.seconds,
         "seed": args.seed,
         **origin,
+        "calibration": {"in_use": constant_in_use(), "fits": fits},
         "walkers": [_about(walker) for walker in walkers],
         "levels": [row for row in rows if row["part"] == "levels"],
         "sweep": [row for row in rows if row["part"] == "sweep"],
@@ -132,7 +139,9 @@ def paper(args: PaperArgs) -> None:
 def _told(args: PaperArgs, rows: Sequence[Mapping[str, Any]], walked: Path | None) -> Words:
     """Return the parts that the report tells of."""
     known = {*args.parts, *(row["part"] for row in rows)} | ({"walk"} if walked else set())
-    return tuple(part for part in PARTS if part in known)
+    possible = tuple(part for part in PARTS if part != "calibration" or args.dreamwaq)
+    told = tuple(part for part in possible if part in known)
+    return PARTS if told == possible else told
 
 
 def _walk(args: PaperArgs) -> WalkArgs:
@@ -157,6 +166,8 @@ def _check(args: PaperArgs) -> None:
         paths = getattr(args, name)
         if paths:
             check_distinct(name, paths)
+    if args.parts == ("calibration",) and not args.dreamwaq:
+        raise MuteError("--parts calibration needs a policy of DreamWaQ's, --dreamwaq names none")
     if not args.mute:
         raise MuteError("--mute must name at least one policy, got none")
 

@@ -55,6 +55,10 @@ class Extent:
     """Commanded forward speed of the sweep, m/s."""
     walk_trials: int
     """Robots of the long walk."""
+    calibration_trials: int
+    """Robots that the constant is fitted on."""
+    calibration_seconds: float
+    """Length of their trials, s."""
 
     def with_trials(self, trials: int | None) -> Extent:
         """Return the same with another number of robots; None leaves it."""
@@ -74,6 +78,8 @@ FULL = Extent(
     sweep_betas=tuple(round(0.1 * tenth, 1) for tenth in range(11)),
     sweep_speed=0.8,
     walk_trials=16,
+    calibration_trials=64,
+    calibration_seconds=3.0,
 )
 """The paper's: 20 trials of 10 s."""
 QUICK = Extent(
@@ -84,6 +90,8 @@ QUICK = Extent(
     sweep_betas=(0.0, 0.5, 1.0),
     sweep_speed=0.8,
     walk_trials=1,
+    calibration_trials=2,
+    calibration_seconds=2.0,
 )
 """As little as shows that all of it works; its figures mean nothing."""
 

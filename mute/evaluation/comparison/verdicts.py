@@ -41,7 +41,10 @@ class Verdict:
 
 
 def verdicts(
-    rows: Sequence[Row], sweep: Sequence[Row], walk: Mapping[str, Any] | None
+    rows: Sequence[Row],
+    sweep: Sequence[Row],
+    walk: Mapping[str, Any] | None,
+    fitted: tuple[str, str] | None = None,
 ) -> list[Verdict]:
     """Return what the paper claims, and whether it comes out; without what was not measured.
 
@@ -49,11 +52,12 @@ def verdicts(
         rows: Rows of the part `levels`.
         sweep: Rows of the part `sweep`.
         walk: What came of the long walk.
+        fitted: Label and floor whose level the model is fitted to, and which is no prediction.
     """
     found = []
     for surface in FLOORS_COMPARED:
-        found += _ordering(rows, surface)
-    found += _headline(rows)
+        found += _ordering(rows, surface, fitted)
+    found += _headline(rows, fitted)
     found += _as_obedient(rows)
     found += _monotone(sweep)
     if walk is not None and walk["mnl_mean"] is not None:
@@ -69,14 +73,18 @@ def _at_half(rows: Sequence[Row], name: str, surface: str) -> float | None:
     return None if found is None else found.mean
 
 
-def _ordering(rows: Sequence[Row], surface: str) -> list[Verdict]:
+def _ordering(rows: Sequence[Row], surface: str, fitted: tuple[str, str] | None) -> list[Verdict]:
     levels = {name: _at_half(rows, name, surface) for name in PAPERS_ROWS}
     told = {name: value for name, value in levels.items() if value is not None}
+    left_out = fitted[0] if fitted is not None and fitted[1] == surface else None
+    is_there = told.pop(left_out, None) is not None if left_out else False
     if len(told) < 2:
         return []
     values = list(told.values())
     holds = all(louder > quieter for louder, quieter in pairwise(values))
     claim = f"{' > '.join(told)} on {surface}"
+    if is_there:
+        claim += f", without {left_out}, which is fitted there"
     figure = " > ".join(f"{value:.1f}" for value in values) + " dBA"
     return [Verdict(claim, figure + _fallen(rows, told, (surface,)), holds)]
 
@@ -92,26 +100,29 @@ def _fallen(rows: Sequence[Row], names: Iterable[str], surfaces: Sequence[str]) 
     return told
 
 
-def _headline(rows: Sequence[Row]) -> list[Verdict]:
-    """Return by how much beta 1 is quieter than the mean of both baselines, over the floors."""
+def _headline(rows: Sequence[Row], fitted: tuple[str, str] | None) -> list[Verdict]:
+    """Return by how much beta 1 is quieter than the mean of both baselines, over the floors.
+
+    Without a floor that the level of one of them is fitted on.
+    """
     found = []
+    names = (MPC, DREAMWAQ, label(MUTE, 1.0))
+    floors = [floor for floor in FLOORS_COMPARED if fitted not in [(one, floor) for one in names]]
+    over = "the floors" if len(floors) == len(FLOORS_COMPARED) else " and ".join(floors)
     for what, value_of in (
         ("asked for 0.5 m/s", _at_half),
         ("at an actual 0.5 m/s", equal_speed_level),
     ):
         gains = []
-        for surface in FLOORS_COMPARED:
-            loud = [value_of(rows, name, surface) for name in (MPC, DREAMWAQ)]
-            quiet = value_of(rows, label(MUTE, 1.0), surface)
-            known = [value for value in (*loud, quiet) if value is not None]
-            if len(known) == 3 and not any(math.isnan(value) for value in known):
+        for surface in floors:
+            told = [value_of(rows, name, surface) for name in names]
+            known = [value for value in told if value is not None and not math.isnan(value)]
+            if len(known) == len(names):
                 gains.append(statistics.fmean(known[:2]) - known[2])
-        if len(gains) == len(FLOORS_COMPARED):
+        if len(gains) == len(floors):
             gain = statistics.fmean(gains)
             claim = f"beta 1 is 8 dBA under the mean of both baselines, {what}"
-            names = (MPC, DREAMWAQ, label(MUTE, 1.0))
-            figure = f"{gain:.1f} dBA, mean of the floors"
-            figure += _fallen(rows, names, FLOORS_COMPARED)
+            figure = f"{gain:.1f} dBA, mean of {over}" + _fallen(rows, names, floors)
             found.append(Verdict(claim, figure, gain >= 8.0))
     return found
 

@@ -13,7 +13,7 @@ from places import SHIPPED_POLICY
 from policy_variants import write_variant
 
 from mute.acoustics import origin
-from mute.command_lines import evaluate, paper_measurements
+from mute.command_lines import evaluate, evaluate_paper, paper_calibration, paper_measurements
 from mute.command_lines.card_comparison import comparison_report
 from mute.support.errors import MuteError
 
@@ -67,7 +67,16 @@ def measured(monkeypatch) -> list[str]:
             for each in job.settings
         ]
 
+    def fitted(asked, driver) -> dict[str, Any]:
+        done.append(f"calibration {driver.task} {asked.floor}")
+        levels = {"target_mnl": 73.51, "mnl": 73.51, "mnl_ci95": 0.25}
+        return levels | {"transmissibility": 0.06, "floor": asked.floor, "robots": 64}
+
     monkeypatch.setattr(paper_measurements, "measure", measure)
+    monkeypatch.setattr(paper_calibration, "fitted", fitted)
+    used = {"transmissibility": 0.03, "label": "MUTE, beta 0", "floor": "wood"}
+    used["policy_sha256"] = "5" * 64
+    monkeypatch.setattr(evaluate_paper, "constant_in_use", lambda: used)
     return done
 
 
@@ -191,10 +200,11 @@ def test_what_a_tree_with_changes_measured_is_never_taken_again(
 
 
 def test_a_part_alone_leaves_the_others_in_the_report(tmp_path, measured, walked):
-    words = ["paper", "--no-mpc", "--out", str(tmp_path)]
+    dreamwaq = write_dreamwaq_policy(tmp_path / "dreamwaq.pt")
+    words = ["paper", "--no-mpc", "--dreamwaq", str(dreamwaq), "--out", str(tmp_path)]
     assert evaluate.main(words) == 0
     report, found = (tmp_path / "comparison.md").read_text(), _found(tmp_path)
-    for part in ("sweep", "walk", "levels"):
+    for part in ("calibration", "sweep", "walk", "levels"):
         before = len(measured), len(walked)
         assert evaluate.main([*words, "--parts", part]) == 0
         assert (len(measured), len(walked)) == before
@@ -202,7 +212,7 @@ def test_a_part_alone_leaves_the_others_in_the_report(tmp_path, measured, walked
         assert _found(tmp_path) == found
     # Measured anew is what is asked for, and no more.
     assert evaluate.main([*words, "--parts", "sweep", "--anew"]) == 0
-    assert measured[4:] == ["sweep MUTE wood"]
+    assert measured[8:] == ["sweep MUTE wood"]
     assert _found(tmp_path) == found
 
 
@@ -243,11 +253,17 @@ def test_the_report_of_the_same_figures_is_the_same_byte_for_byte(tmp_path, meas
     assert "1 of 1 robots arrived; MNL 66.0 dBA" in report
     assert f"({walked[0][0].relative_to(one)}/course_map.png)" in report
     # 69 dBA and half a dBA for the speed; the paper's 68.61.
-    assert "| MUTE, beta 0 | wood | 69.5 ± 0.4 | 68.6 | +0.9 |" in report
+    assert "| MUTE, beta 0 | wood | 69.5 ± 0.4 (fitted) | 68.6 | +0.9 |" in report
     assert "| DreamWaQ | tile | 72.5 ± 0.4 | 72.3 | +0.2 |" in report
     assert "| 0.45 | 20 of 20 | 5.0 % |\n| MPC | tile | 75.5" in report
     assert "| 0.45 | 18 of 20 | **20.0 %** |\n| DreamWaQ | wood" in report
-    assert "| MPC > DreamWaQ > MUTE, beta 0 > MUTE, beta 1 on wood | 75.5 > 72.5 >" in report
+    assert report.count("(fitted)") == 1
+    assert "| MPC > DreamWaQ > MUTE, beta 1 on wood, without MUTE, beta 0, which is fit" in report
+    assert "| MPC > DreamWaQ > MUTE, beta 0 > MUTE, beta 1 on carpet | 75.5 > 72.5 >" in report
+    assert "the share 0.0300 comes to the robot's shell: fitted such that MUTE, beta 0" in report
+    assert "with the policy of SHA-256 555555555555. That level is marked" in report
+    # 20 log10(0.06 / 0.03) is 6.02.
+    assert "| 0.0600 | +6.0 | ± 0.2 | - |" in report
     assert "| quieter at every step of beta, 0.8 m/s on wood | 10 of 10 steps" in report
     assert "python evaluate.py paper --dreamwaq" in report
 
@@ -351,7 +367,8 @@ def test_two_walks_that_differ_are_both_kept(tmp_path, walked):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--parts", "noise"], "--parts must be of levels, sweep, walk, got 'noise'"),
+        (["--parts", "noise"], "--parts must be of calibration, levels, sweep, walk, got 'noise'"),
+        (["--parts", "calibration", "--dreamwaq"], "--parts calibration needs a policy of Dr"),
         (["--mute"], "--mute must name at least one policy, got none"),
         (["--mute", "gone.pt"], "gone.pt"),
         (["--beta", "2"], "--beta must be numbers in"),

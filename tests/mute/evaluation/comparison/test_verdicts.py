@@ -94,3 +94,22 @@ def test_who_falls_often_is_named_beside_its_level():
     assert found[f"{order} wood"] == "80.0 > 74.0 > 66.0 dBA"
     headline = found["beta 1 is 8 dBA under the mean of both baselines, asked for 0.5 m/s"]
     assert headline.endswith("mean of the floors; 15 % of MPC's robots fell")
+
+
+def test_a_level_that_is_fitted_is_left_out_of_what_is_predicted():
+    rows = [*floors("MPC", 80.0, 76.0, 78.0), *floors("DreamWaQ", 74.0, 72.0, 70.0)]
+    rows += floors("MUTE, beta 0", 75.0, 68.0, 69.0)
+    rows += floors("MUTE, beta 1", 66.0, 63.0, 67.5)
+    fitted = ("MUTE, beta 0", "wood")
+    found = {one.claim: one for one in verdicts(rows, [], None, fitted)}
+    order = "MPC > DreamWaQ > MUTE, beta 1 on wood, without MUTE, beta 0, which is fitted there"
+    assert found[order].holds
+    assert found[order].figure == "80.0 > 74.0 > 66.0 dBA"
+    assert "MPC > DreamWaQ > MUTE, beta 0 > MUTE, beta 1 on tile" in found
+    headline = "beta 1 is 8 dBA under the mean of both baselines, asked for 0.5 m/s"
+    assert found[headline].figure.endswith("mean of the floors")
+    # Means of both baselines 74 and 74, less 63 and 67.5.
+    (found,) = [
+        one for one in verdicts(rows, [], None, ("DreamWaQ", "wood")) if one.claim == headline
+    ]
+    assert found.figure == "8.8 dBA, mean of carpet and tile"
