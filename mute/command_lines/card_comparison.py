@@ -15,6 +15,7 @@ from mute.evaluation.comparison.conclusions import (
     labels,
     level,
     papers_level,
+    source_level,
     walked,
 )
 from mute.evaluation.comparison.measurements import FLOORS_COMPARED, MADE_WITH
@@ -242,17 +243,15 @@ def _sources_table(rows: Sequence[Row]) -> str:
     columns = {"label": ("method", "{}"), "surface": ("floor", "{}")} | {
         f"laeq_{source}": (source, "{:.1f}") for source in SOURCES
     }
-    at_half = [row for row in rows if row["command_speed"] == EQUAL_SPEED]
-    first = {(row["label"], row["surface"]): row for row in reversed(at_half)}
     table = [
-        first[name, surface]
+        {"label": name, "surface": surface}
+        | {f"laeq_{source}": source_level(rows, name, surface, source) for source in SOURCES}
         for name in labels(rows)
         for surface in FLOORS_COMPARED
-        if (name, surface) in first
+        if walked(rows, name, surface, EQUAL_SPEED) is not None
     ]
-    return "LAeq of each source alone, asked for 0.5 m/s; of the first training.\n\n" + markdown(
-        table, columns
-    )
+    text = "LAeq of each source alone, asked for 0.5 m/s; of several trainings it is the mean."
+    return f"{text}\n\n{markdown(table, columns)}"
 
 
 def _sweep_table(sweep: Sequence[Row]) -> str:

@@ -28,6 +28,7 @@ __all__ = [
     "level",
     "papers_level",
     "pareto_front",
+    "source_level",
     "walked",
 ]
 
@@ -88,6 +89,26 @@ def level(rows: Sequence[Row], name: str, surface: str, speed: float, figure: st
     spreads = [row[f"{figure}_std"] for row in own if row[f"{figure}_std"] is not None]
     spread = statistics.fmean(spreads) if spreads else math.nan
     return Level(statistics.fmean(means), spread, means)
+
+
+def source_level(rows: Sequence[Row], name: str, surface: str, source: str) -> float | None:
+    """Return the LAeq of one source alone at `EQUAL_SPEED` as asked for, dBA.
+
+    Args:
+        rows: Rows of the part `levels`.
+        name: The label.
+        surface: Name of the floor.
+        source: The source.
+
+    Returns:
+        The mean over the trainings in which it was heard; None if that is none.
+    """
+    known = [
+        row[f"laeq_{source}"]
+        for row in _of(rows, name, surface)
+        if row["command_speed"] == EQUAL_SPEED and row[f"laeq_{source}"] is not None
+    ]
+    return statistics.fmean(known) if known else None
 
 
 @dataclass(frozen=True)

@@ -39,3 +39,27 @@ def test_where_many_fall_a_point_is_hollow_and_bounds_no_front(drawn, tmp_path):
     assert hollow.get_markerfacecolor() == "white"
     figures.draw_levels(rows[1:], tmp_path)
     assert "hollow" not in drawn["front"].axes[0].get_title()
+
+
+def test_methods_quiet_terms_and_ablations_at_three_quiet_factors_are_all_told_apart(
+    drawn, tmp_path
+):
+    names = ["MPC", "DreamWaQ"]
+    names += [f"{name}, beta {beta}" for name in "ABCDEFGHIJK" for beta in (0, 0.5, 1)]
+    rows = [make_row(name, 60.0, command=speed) for name in names for speed in (0.5, 0.8)]
+    figures.draw_levels(rows, tmp_path)
+    lines = [line for line in drawn["speed"].axes[0].lines if len(line.get_xdata()) > 0]
+    assert [line.get_label() for line in lines] == names
+    assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == len(names) == 35
+    for figure in (drawn["speed"], drawn["front"]):
+        (legend,) = figure.legends
+        assert [text.get_text() for text in legend.get_texts()] == names
+        figure.draw_without_rendering()
+        assert figure.axes[0].get_window_extent().x1 <= legend.get_window_extent().x0
+    assert drawn["sources"].get_figwidth() == pytest.approx(0.4 * len(names))
+
+
+def test_few_labels_have_their_legend_within_the_axes(drawn, tmp_path):
+    figures.draw_levels([make_row("MPC", 60.0), make_row("DreamWaQ", 61.0)], tmp_path)
+    assert drawn["speed"].legends == []
+    assert drawn["speed"].axes[0].get_legend() is not None

@@ -14,6 +14,7 @@ from mute.evaluation.comparison.conclusions import (
     level,
     papers_level,
     pareto_front,
+    source_level,
     walked,
 )
 
@@ -81,3 +82,15 @@ def test_how_robots_walked_is_over_all_trainings():
     assert (found.heard, found.trials) == (39, 40)
     assert walked(rows, "MPC", "tile", 0.5) is None
     assert [falls_often(row) for row in rows] == [True, False, True]
+
+
+def test_a_source_is_the_mean_over_the_trainings_that_it_was_heard_in():
+    rows = [
+        make_row("MPC", 75.0, laeq_impacts=60.0, laeq_fan=None),
+        make_row("MPC", 75.0, policy="b.pt", laeq_impacts=63.0, laeq_fan=None),
+        make_row("MPC", 75.0, policy="c.pt", laeq_impacts=None, laeq_fan=None),
+        make_row("MPC", 75.0, command=0.8, laeq_impacts=90.0),
+        make_row("MPC", 75.0, "tile", laeq_impacts=90.0),
+    ]
+    assert source_level(rows, "MPC", "wood", "impacts") == 61.5
+    assert source_level(rows, "MPC", "wood", "fan") is None
