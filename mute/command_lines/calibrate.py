@@ -52,7 +52,7 @@ from mute.support.errors import MuteError
 from mute.support.provenance import REPOSITORY, current_commit, file_sha256, machine_kind
 from mute.support.ranges import Range
 
-__all__ = ["REFERENCES", "CalibrationArgs", "fit_share", "main", "provenance"]
+__all__ = ["REFERENCES", "CalibrationArgs", "fit_share", "fitted", "main", "provenance"]
 
 REFERENCES = {"mute": "mute beta 0", "dreamwaq": "dreamwaq"}
 """Rows of the paper that can be fitted, by the argument that names them."""
@@ -109,12 +109,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     if args.out.is_dir():
         raise MuteError(f"--out {args.out}: must name a file, and is a directory")
     origin = provenance(args, policy)  # now: a file may be replaced while this runs
-    target, _ = PAPER_LEVELS[REFERENCES[args.reference]][args.floor]
-    fitted = _fitted(args, policy, target)
-    write_json(args.out, origin | {"reference": args.reference} | fitted)
+    found = fitted(args, policy)
+    write_json(args.out, origin | {"reference": args.reference} | found)
     print(
-        f"transmissibility {fitted['transmissibility']:.4f}: MNL {fitted['mnl']:.2f} dBA on "
-        f"{args.floor}, the paper's {target:.2f}; PNL {fitted['pnl']:.2f}"
+        f"transmissibility {found['transmissibility']:.4f}: MNL {found['mnl']:.2f} dBA on "
+        f"{args.floor}, the paper's {found['target_mnl']:.2f}; PNL {found['pnl']:.2f}"
     )
     print(f"written: {args.out}")
     return 0
@@ -167,8 +166,17 @@ def fit_share(mnl: Callable[[float], float], target: float) -> float:
     return 10.0 ** (float(decibels) / 20.0)  # pyright: ignore[reportArgumentType]
 
 
-def _fitted(args: CalibrationArgs, policy: Driver, target: float) -> dict[str, Any]:
-    """Return what was fitted, and the levels that come of it."""
+def fitted(args: CalibrationArgs, policy: Driver) -> dict[str, Any]:
+    """Return what is fitted, and the levels that come of it, as plain data.
+
+    Args:
+        args: Which row of the paper is fitted, and by which trials; they are checked already.
+        policy: The policy of these arguments.
+
+    Raises:
+        MuteError: If all robots fall, or no share of a foot's force gives the level.
+    """
+    target, _ = PAPER_LEVELS[REFERENCES[args.reference]][args.floor]
     robot, rest = _walk(args, policy)
 
     def levels(share: float) -> tuple[list[float], list[float]]:

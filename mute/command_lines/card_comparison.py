@@ -10,16 +10,19 @@ from mute.acoustics.soundscape import SOURCES
 from mute.command_lines.card_tables import markdown
 from mute.evaluation.comparison.conclusions import (
     EQUAL_SPEED,
+    MOST_FALLS,
     equal_speed_level,
     labels,
     level,
     papers_level,
-    verdicts,
+    source_level,
+    walked,
 )
-from mute.evaluation.comparison.measurements import FLOORS_COMPARED
+from mute.evaluation.comparison.measurements import FLOORS_COMPARED, MADE_WITH
+from mute.evaluation.comparison.verdicts import verdicts
 from mute.evaluation.paper_levels import PAPER_WALK
 
-__all__ = ["comparison_report"]
+__all__ = ["comparison_report", "measured_before"]
 
 Row = Mapping[str, Any]
 
@@ -32,11 +35,13 @@ def comparison_report(found: Mapping[str, Any]) -> str:
     """
     rows, sweep, walk = found["levels"], found["sweep"], found["walk"]
     parts = [_head(found), _walkers_table(found["walkers"])]
-    told = verdicts(rows, sweep, walk)
+    fitted = _fitted_cell(found)
+    parts += ["## The constant", _constant_text(found["calibration"])]
+    told = verdicts(rows, sweep, walk, fitted)
     if told:
         parts += ["## What the paper found, here", _verdicts_table(told)]
     if rows:
-        parts += ["## Levels at 0.5 m/s", _levels_text(found), _levels_table(rows)]
+        parts += ["## Levels at 0.5 m/s", _levels_text(found), _levels_table(rows, fitted)]
         parts += ["## Where the noise comes from", _sources_table(rows)]
     if sweep:
         parts += ["## The quiet factor", _sweep_table(sweep)]
@@ -58,8 +63,31 @@ def _head(found: Mapping[str, Any]) -> str:
         "Every level is modelled and dBA at the trunk; nothing was measured on a real robot."
         f"{quick} {found['trials']} robots a setting, {found['seconds']:g} s each, seed "
         f"{found['seed']}; they differ and see with noise. Commit {found['commit']}, calibration "
-        f"{found['calibration_sha256'][:12]}, on {found['machine']}."
+        f"{found['calibration_sha256'][:12]}, on {found['machine']}.{_before(found)}"
     )
+
+
+def _before(found: Mapping[str, Any]) -> str:
+    others = measured_before(found)
+    return f" Measured before: {'; '.join(others)}." if others else ""
+
+
+def measured_before(found: Mapping[str, Any]) -> list[str]:
+    """Return what was measured with another commit or machine than the rest, a line for each."""
+    made_with = {name: found[name] for name in MADE_WITH}
+    counts: dict[tuple[str, ...], int] = {}
+    for row in (*found["calibration"]["fits"], *found["levels"], *found["sweep"]):
+        if {name: row[name] for name in MADE_WITH} != made_with:
+            at = tuple(row[name] for name in MADE_WITH)
+            counts[at] = counts.get(at, 0) + 1
+    told = [
+        f"{count} setting{'s' * (count > 1)} at commit {commit} on {machine}"
+        for (commit, machine), count in counts.items()
+    ]
+    walk = found["walk"]
+    if walk is not None and {name: walk[name] for name in MADE_WITH} != made_with:
+        told.append(f"the long walk at commit {walk['commit']} on {walk['machine']}")
+    return told
 
 
 def _walkers_table(walkers: Sequence[Row]) -> str:
@@ -71,6 +99,52 @@ def _walkers_table(walkers: Sequence[Row]) -> str:
         "digest": ("SHA-256", "{}"),
     }
     return markdown([dict(row) | {"digest": row["sha256"][:12]} for row in walkers], columns)
+
+
+def _fitted_cell(found: Mapping[str, Any]) -> tuple[str, str] | None:
+    """Return the label and the floor whose level is fitted; None if the calibration tells none."""
+    used = found["calibration"]["in_use"]
+    known = used["label"] is not None and used["floor"] is not None
+    return (used["label"], used["floor"]) if known else None
+
+
+def _constant_text(calibration: Mapping[str, Any]) -> str:
+    used, fits = calibration["in_use"], calibration["fits"]
+    share = used["transmissibility"]
+    to_what = (
+        "what it is fitted to, its file does not say."
+        if used["label"] is None or used["floor"] is None
+        else f"fitted such that {used['label']} has the paper's MNL on {used['floor']} at "
+        f"{EQUAL_SPEED:g} m/s{_with_policy(used)}. That level is marked in the table, and counts "
+        "nowhere as predicted; all else is."
+    )
+    text = f"Of a force at a foot, the share {share:.4f} comes to the robot's shell: {to_what}"
+    if not fits:
+        return text
+    shown = [fit | {"beside": _decibels(fit, share), "ci": fit["mnl_ci95"]} for fit in fits]
+    columns = {
+        "policy": ("policy", "{}"),
+        "training_seed": ("seed", "{}"),
+        "transmissibility": ("share", "{:.4f}"),
+        "beside": ("beside that in use (dB)", "{:+.1f}"),
+        "ci": ("MNL known within (dB)", "± {:.1f}"),
+        "reason": ("why there is none", "{}"),
+    }
+    return (
+        f"{text}\n\nThis share would give {fits[0]['label']} the paper's MNL on wood; nothing here "
+        f"uses it.\n\n{markdown(shown, columns)}"
+    )
+
+
+def _with_policy(used: Mapping[str, Any]) -> str:
+    digest = used["policy_sha256"]
+    return "" if digest is None else f" with the policy of SHA-256 {digest[:12]}"
+
+
+def _decibels(fit: Row, share: float) -> float | None:
+    if fit["transmissibility"] is None or share <= 0.0:
+        return None
+    return 20.0 * math.log10(fit["transmissibility"] / share)
 
 
 def _verdicts_table(told: Sequence[Any]) -> str:
@@ -91,8 +165,10 @@ def _levels_text(found: Mapping[str, Any]) -> str:
     )
     return (
         "MNL and PNL, asked for 0.5 m/s, with the standard deviation over robots; the paper's; and "
-        f"the difference.{over} The last column is the MNL at an *actual* {EQUAL_SPEED:g} m/s, "
-        "between what came out of other commands."
+        f"the difference.{over} Then the MNL at an *actual* {EQUAL_SPEED:g} m/s, between what came "
+        "out of other commands; the actual speed at this one; the robots that a level is of, which "
+        "leaves out those that kept falling; and how many fell, in bold where these are more than "
+        f"{100.0 * MOST_FALLS:.0f} %: such levels tell little."
     )
 
 
@@ -105,7 +181,7 @@ def _table_levels(rows: Sequence[Row]) -> list[Any]:
     return [one for one in every if one is not None]
 
 
-def _levels_table(rows: Sequence[Row]) -> str:
+def _levels_table(rows: Sequence[Row], fitted: tuple[str, str] | None) -> str:
     columns = {
         "label": ("method", "{}"),
         "surface": ("floor", "{}"),
@@ -116,6 +192,9 @@ def _levels_table(rows: Sequence[Row]) -> str:
         "pnl_paper": ("paper", "{:.1f}"),
         "pnl_off": ("differs", "{:+.1f}"),
         "equal": ("MNL at equal speed", "{:.1f}"),
+        "speed": ("speed (m/s)", "{:.2f}"),
+        "heard": ("heard", "{}"),
+        "fell": ("fell", "{}"),
     }
     table = []
     for name in labels(rows):
@@ -125,8 +204,22 @@ def _levels_table(rows: Sequence[Row]) -> str:
             line["equal"] = None if math.isnan(equal) else equal
             for figure in ("mnl", "pnl"):
                 line |= _level_cells(rows, name, surface, figure)
-            table.append(line)
+            if (name, surface) == fitted and line["mnl"] is not None:
+                line["mnl"] += " (fitted)"
+            table.append(line | _walked_cells(rows, name, surface))
     return markdown(table, columns)
+
+
+def _walked_cells(rows: Sequence[Row], name: str, surface: str) -> dict[str, Any]:
+    found = walked(rows, name, surface, EQUAL_SPEED)
+    if found is None:
+        return dict.fromkeys(("speed", "heard", "fell"))
+    fell = f"{100.0 * found.fall_rate:.1f} %"
+    return {
+        "speed": None if math.isnan(found.speed) else found.speed,
+        "heard": f"{found.heard} of {found.trials}",
+        "fell": f"**{fell}**" if found.fall_rate > MOST_FALLS else fell,
+    }
 
 
 def _level_cells(rows: Sequence[Row], name: str, surface: str, figure: str) -> dict[str, Any]:
@@ -150,17 +243,15 @@ def _sources_table(rows: Sequence[Row]) -> str:
     columns = {"label": ("method", "{}"), "surface": ("floor", "{}")} | {
         f"laeq_{source}": (source, "{:.1f}") for source in SOURCES
     }
-    at_half = [row for row in rows if row["command_speed"] == EQUAL_SPEED]
-    first = {(row["label"], row["surface"]): row for row in reversed(at_half)}
     table = [
-        first[name, surface]
+        {"label": name, "surface": surface}
+        | {f"laeq_{source}": source_level(rows, name, surface, source) for source in SOURCES}
         for name in labels(rows)
         for surface in FLOORS_COMPARED
-        if (name, surface) in first
+        if walked(rows, name, surface, EQUAL_SPEED) is not None
     ]
-    return "LAeq of each source alone, asked for 0.5 m/s; of the first training.\n\n" + markdown(
-        table, columns
-    )
+    text = "LAeq of each source alone, asked for 0.5 m/s; of several trainings it is the mean."
+    return f"{text}\n\n{markdown(table, columns)}"
 
 
 def _sweep_table(sweep: Sequence[Row]) -> str:

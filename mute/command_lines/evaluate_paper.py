@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from typing import Any
 
 import torch
 
-from mute.acoustics.origin import policy_origin, sound_origin
+from mute.acoustics.origin import sound_origin
 from mute.command_lines.arguments import (
     Words,
     check_betas,
@@ -22,24 +21,30 @@ from mute.command_lines.arguments import (
     make_directory,
 )
 from mute.command_lines.card_comparison import comparison_report
-from mute.command_lines.evaluate_walk import WalkArgs, walk
-from mute.command_lines.policy_options import DriverArgs
-from mute.command_lines.sound_options import load_audible_policy, progress_bar, tell
-from mute.evaluation.comparison.measurements import FULL, QUICK, Extent, Job, Kept, jobs, measure
-from mute.evaluation.comparison.walkers import DREAMWAQ, MPC, MUTE, Walker
+from mute.command_lines.evaluate_walk import WalkArgs
+from mute.command_lines.paper_calibration import constant_in_use, dreamwaqs_constants
+from mute.command_lines.paper_measurements import (
+    kept_walk,
+    measured_rows,
+    tell_of_others,
+    walked_folder,
+)
+from mute.command_lines.paper_walkers import find_walkers
+from mute.command_lines.sound_options import tell
+from mute.evaluation.comparison.measurements import DIRTY, FULL, QUICK, Extent, Kept, jobs
+from mute.evaluation.comparison.walkers import Walker
 from mute.evaluation.plotting import check_matplotlib
 from mute.evaluation.tables import print_table, read_json, write_csv, write_json
 from mute.support.errors import MuteError
 from mute.support.files import write_file
 from mute.support.plain_data import without_nan
-from mute.support.provenance import digest_of, file_sha256
 from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK
 
 __all__ = ["PARTS", "PaperArgs", "paper"]
 
-PARTS = ("levels", "sweep", "walk")
+PARTS = ("calibration", "levels", "sweep", "walk")
 """What the comparison is made of."""
 
 _POLICIES = RESOURCES / "go1"
@@ -55,24 +60,29 @@ def _that_ship(task: str) -> tuple[Path, ...]:
 class PaperArgs:
     """Every experiment of the paper, in simulation, with a report.
 
-    Levels of all methods on wood, carpet and tile at several speeds, the quiet factor, and the long
-    walk. What has been measured is kept, and read back where the command is run again.
+    The constant that DreamWaQ would give, levels of all methods on wood, carpet and tile at several
+    speeds, the quiet factor, and the long walk. What has been measured is kept, and read back where
+    the command is run again.
     """
 
     mute: tuple[Path, ...] = _that_ship(DEFAULT_TASK)
     """MUTE's policies; several are trainings of one recipe."""
     dreamwaq: tuple[Path, ...] = _that_ship("go1_dreamwaq")
     """DreamWaQ's; by default the one that ships, if one does."""
-    others: tuple[Path, ...] = ()
-    """Policies of further tasks to compare, under the tasks' names."""
+    others: tuple[str, ...] = ()
+    """Further policies to compare, NAME=FILE, several of one name being trainings of one recipe; a
+    FILE alone has the name of its task."""
     mpc: bool = True
     """Whether the model-predictive controller is compared."""
     parts: Words = PARTS
-    """What to measure: levels, sweep (of the quiet factor), walk."""
+    """What to measure: calibration (the constant that DreamWaQ on wood would give), levels, sweep
+    (of the quiet factor), walk."""
     beta: float = 0.5
     """Quiet factor of the long walk."""
     trials: int | None = None
     """Robots for each setting; the paper's 20 unless given, 2 with --quick."""
+    anew: bool = False
+    """Measure all again, whatever is kept."""
     quick: bool = False
     """As little of everything as shows that it works."""
     seed: int = 1
@@ -95,25 +105,55 @@ def paper(args: PaperArgs) -> None:
     _check(args)
     check_matplotlib()
     origin = sound_origin()
-    walkers = _walkers(args)
+    walkers = find_walkers(args.mute, args.dreamwaq, args.others, args.mpc)
     make_directory(args.out / "measured")
     torch.set_num_threads(1)  # the physics engine has the cores
+    if origin["commit"].endswith(DIRTY):
+        tell("the working tree differs from its commit: what is measured now is not taken again")
     kept = Kept(args.out / "measured", origin)
-    rows = _measured(args, jobs(walkers, args.extent, args.parts), kept)
-    walked = _walked(args, origin) if "walk" in args.parts else None
+    # A part alone leaves the others in the report, where they are measured already.
+    fits = dreamwaqs_constants(
+        walkers, args.extent, args.seed, kept, "calibration" in args.parts, args.anew
+    )
+    wanted = jobs(walkers, args.extent, PARTS)
+    rows = measured_rows(wanted, args.parts, args.extent, args.seed, kept, args.anew)
+    asked, walks = _walk(args), "walk" in args.parts
+    walked = walked_folder(asked, origin, args.anew) if walks else kept_walk(asked, origin)
     found: dict[str, Any] = {
-        "command": _command(args),
+        "command": _command(args, _told(args, [*fits, *rows], walked)),
         "quick": args.quick,
         "trials": args.extent.trials,
         "seconds": args.extent.seconds,
         "seed": args.seed,
         **origin,
+        "calibration": {"in_use": constant_in_use(), "fits": fits},
         "walkers": [_about(walker) for walker in walkers],
         "levels": [row for row in rows if row["part"] == "levels"],
         "sweep": [row for row in rows if row["part"] == "sweep"],
         "walk": None if walked is None else read_json(walked / "walk.json"),
     }
+    tell_of_others(found)
     _report(args, without_nan(found), walked)
+
+
+def _told(args: PaperArgs, rows: Sequence[Mapping[str, Any]], walked: Path | None) -> Words:
+    """Return the parts that the report tells of."""
+    known = {*args.parts, *(row["part"] for row in rows)} | ({"walk"} if walked else set())
+    possible = tuple(part for part in PARTS if part != "calibration" or args.dreamwaq)
+    told = tuple(part for part in possible if part in known)
+    return PARTS if told == possible else told
+
+
+def _walk(args: PaperArgs) -> WalkArgs:
+    """Return the long walk: of the first of MUTE's policies."""
+    return WalkArgs(
+        policy=args.mute[0],
+        course=_COURSES / ("short.yaml" if args.quick else "office.yaml"),
+        beta=args.beta,
+        trials=args.extent.walk_trials,
+        seed=args.seed,
+        out=args.out / "walks",
+    )
 
 
 def _check(args: PaperArgs) -> None:
@@ -126,99 +166,10 @@ def _check(args: PaperArgs) -> None:
         paths = getattr(args, name)
         if paths:
             check_distinct(name, paths)
+    if args.parts == ("calibration",) and not args.dreamwaq:
+        raise MuteError("--parts calibration needs a policy of DreamWaQ's, --dreamwaq names none")
     if not args.mute:
         raise MuteError("--mute must name at least one policy, got none")
-
-
-def _walkers(args: PaperArgs) -> list[Walker]:
-    """Return what is compared, from loud to quiet as the paper has it.
-
-    Raises:
-        MuteError: If a policy cannot be used.
-    """
-    walkers = []
-    if args.mpc:
-        mpc = DriverArgs(controller="mpc")
-        origin = mpc.driver_origin()
-        walkers.append(Walker(MPC, mpc.driver(), origin["policy"], origin["policy_sha256"]))
-    named = [(DREAMWAQ, path) for path in args.dreamwaq] + [(MUTE, path) for path in args.mute]
-    for method, path in [*named, *(("", path) for path in args.others)]:
-        policy, origin = load_audible_policy(path), policy_origin(path)
-        walkers.append(
-            Walker(method or policy.task, policy, origin["policy"], origin["policy_sha256"])
-        )
-    _check_methods(walkers)
-    return walkers
-
-
-def _check_methods(walkers: Sequence[Walker]) -> None:
-    """Check that policies are of the methods that they are named for.
-
-    Raises:
-        MuteError: If one of MUTE's knows no quiet factor, one of DreamWaQ's does, or those of one
-            method are of several tasks.
-    """
-    for method, option, quiet in ((MUTE, "mute", True), (DREAMWAQ, "dreamwaq", False)):
-        own = [walker for walker in walkers if walker.method == method]
-        for walker in own:
-            if walker.driver.quiet_factor != quiet:
-                knows = "knows no" if quiet else "knows a"
-                raise MuteError(
-                    f"--{option} {walker.name} {knows} quiet factor; compare it by --others"
-                )
-        tasks = sorted({walker.driver.task for walker in own})
-        if len(tasks) > 1:
-            raise MuteError(f"--{option} must be trainings of one task, got {', '.join(tasks)}")
-
-
-def _measured(args: PaperArgs, wanted: Sequence[Job], kept: Kept) -> list[dict[str, Any]]:
-    """Return the rows of all jobs, those read back that were measured before."""
-    extent = args.extent
-    asked = [kept.asked(job, extent, args.seed) for job in wanted]
-    known = [kept.read(each) for each in asked]
-    left = sum(job.steps(extent) for job, rows in zip(wanted, known, strict=True) if rows is None)
-    done = itertools.count(1)
-    rows: list[dict[str, Any]] = []
-    with progress_bar("levels", max(left, 1)) as advance:
-        for job, each, before in zip(wanted, asked, known, strict=True):
-            if before is None:
-                measured = measure(job, extent, args.seed, lambda: advance(next(done)))
-                kept.write(each, measured)
-                rows += without_nan(measured)
-            else:
-                rows += [row | {"policy": job.walker.name} for row in before]
-    return rows
-
-
-def _walked(args: PaperArgs, origin: Mapping[str, str]) -> Path:
-    """Return the folder of the long walk of the first of MUTE's policies, made before or now."""
-    policy = args.mute[0]
-    course = _COURSES / ("short.yaml" if args.quick else "office.yaml")
-    trials = args.extent.walk_trials
-    asked = {
-        **policy_origin(policy),
-        **origin,
-        "course_sha256": file_sha256(course),
-        "beta": args.beta,
-        "seed": args.seed,
-        "trials": trials,
-    }
-    del asked["policy"]  # wherever the same file lies
-    folder = args.out / "walks" / digest_of(asked)
-    done = folder / "done"  # what is there without was stopped
-    if not done.is_file():
-        walk(
-            WalkArgs(
-                policy=policy,
-                course=course,
-                beta=args.beta,
-                trials=trials,
-                seed=args.seed,
-                out=folder,
-            )
-        )
-        write_file(done, b"")
-    return folder
 
 
 def _about(walker: Walker) -> dict[str, Any]:
@@ -232,12 +183,12 @@ def _about(walker: Walker) -> dict[str, Any]:
     }
 
 
-def _command(args: PaperArgs) -> str:
-    """Return the command that measures the same again."""
+def _command(args: PaperArgs, parts: Words) -> str:
+    """Return the command that measures these parts again."""
     words = ["python", "evaluate.py", "paper"]
     default = PaperArgs()
     for name in ("mute", "dreamwaq", "others", "parts"):
-        values = getattr(args, name)
+        values = parts if name == "parts" else getattr(args, name)
         if values != getattr(default, name):
             words += [f"--{name}", *map(str, values)]
     for name in ("beta", "trials", "seed"):

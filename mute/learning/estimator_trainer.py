@@ -54,7 +54,8 @@ class Losses:
     estimation: Tensor
     """L_est: mean squared error of the velocity plus that of the heights, in height_scale."""
     forward: Tensor
-    """L_fwd: mean squared error of o_{t+1} plus lambda KL, the KL summed over z."""
+    """L_fwd: mean squared error of o_{t+1} plus lambda KL, the KL summed over z; over steps with a
+    next observation, with an LSTM the KL over all."""
     phase: Tensor
     """L_phase: mean squared error of the phase."""
     velocity_rmse: Tensor
@@ -95,7 +96,16 @@ def estimator_losses(
         (next_obs_hat - labels.next_obs).square().mean(dim=-1), labels.next_valid, num_valid
     )
     mean, log_var = estimate.latent_mean, estimate.latent_log_var
-    divergence = 0.5 * (mean.square() + log_var.exp() - 1.0 - log_var).sum(dim=-1).mean()
+    divergences = 0.5 * (mean.square() + log_var.exp() - 1.0 - log_var).sum(dim=-1)
+    # Reconstruction and divergence are two sides of one bound: where nothing is decoded, as at
+    # the end of an episode, DreamWaQ's latent is bound to nothing. MUTE's paper names no mask, and
+    # its LSTM hands each step's latent to the phase network: that divergence is over all steps,
+    # and trainings of the recipe stay what they were.
+    divergence = (
+        divergences.mean()
+        if cfg.network.encoder == "lstm"
+        else _masked_mean(divergences, labels.next_valid, num_valid)
+    )
     forward = reconstruction + cfg.lambda_kl * divergence
     difference = estimate.phase - labels.phase
     phase = _masked_mean(difference.square(), labels.phase_closed, num_closed)

@@ -14,10 +14,27 @@ from mute.evaluation.noise_levels import SETTLE_TIME, NoiseSetting, measure_nois
 from mute.evaluation.tables import read_json, write_json
 from mute.support.provenance import digest_of
 
-__all__ = ["FLOORS_COMPARED", "FULL", "QUICK", "Extent", "Job", "Kept", "jobs", "measure"]
+__all__ = [
+    "DIRTY",
+    "FLOORS_COMPARED",
+    "FULL",
+    "MADE_WITH",
+    "QUICK",
+    "Extent",
+    "Job",
+    "Kept",
+    "jobs",
+    "measure",
+]
 
 FLOORS_COMPARED = ("wood", "carpet", "tile")
 """Floors of the paper's table."""
+
+MADE_WITH = ("commit", "machine")
+"""What a measurement was made with, in each of its rows."""
+
+DIRTY = "-dirty"
+"""End of a commit that the working tree differs from, and of the names of files made then."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +55,10 @@ class Extent:
     """Commanded forward speed of the sweep, m/s."""
     walk_trials: int
     """Robots of the long walk."""
+    calibration_trials: int
+    """Robots that the constant is fitted on."""
+    calibration_seconds: float
+    """Length of their trials, s."""
 
     def with_trials(self, trials: int | None) -> Extent:
         """Return the same with another number of robots; None leaves it."""
@@ -57,6 +78,8 @@ FULL = Extent(
     sweep_betas=tuple(round(0.1 * tenth, 1) for tenth in range(11)),
     sweep_speed=0.8,
     walk_trials=16,
+    calibration_trials=64,
+    calibration_seconds=3.0,
 )
 """The paper's: 20 trials of 10 s."""
 QUICK = Extent(
@@ -67,6 +90,8 @@ QUICK = Extent(
     sweep_betas=(0.0, 0.5, 1.0),
     sweep_speed=0.8,
     walk_trials=1,
+    calibration_trials=2,
+    calibration_seconds=2.0,
 )
 """As little as shows that all of it works; its figures mean nothing."""
 
@@ -148,47 +173,65 @@ def measure(
 
 
 class Kept:
-    """Measurements in a folder, each in a file of its own, beside what was asked for."""
+    """Measurements in a folder, each in a file of its own, beside what was asked for.
+
+    Each row has the commit and the kind of machine that it was measured with. Those of other
+    commits are read back, as most change nothing that is measured; those of a working tree that
+    differs from its commit never are, as nobody can tell what they were measured with.
+    """
 
     def __init__(self, folder: Path, origin: Mapping[str, str]) -> None:
         """Keep them in a folder.
 
         Args:
             folder: The folder; it is there.
-            origin: What all of them rest on; those of another commit, calibration or machine are
-                not read back.
+            origin: What is measured now rests on: `calibration_sha256`, `commit` and `machine`.
         """
         self._folder = folder
-        self._origin = dict(origin)
+        self._calibration = origin["calibration_sha256"]
+        self._made_with = {name: origin[name] for name in MADE_WITH}
 
     def asked(self, job: Job, extent: Extent, seed: int) -> dict[str, Any]:
         """Return what decides how a measurement comes out, as plain data."""
         return {
             "part": job.part,
-            "method": job.walker.method,
             "sha256": job.walker.sha256,
             "surface": job.surface,
             "settings": [dataclasses.asdict(setting) for setting in job.settings],
             "trials": extent.trials,
             "seconds": extent.seconds,
             "seed": seed,
-        } | self._origin
+            "calibration_sha256": self._calibration,
+        }
 
-    def read(self, asked: Mapping[str, Any]) -> list[dict[str, Any]] | None:
-        """Return the rows of a measurement that was made; None if it was not."""
+    def read(self, asked: Mapping[str, Any], walker: Walker) -> list[dict[str, Any]] | None:
+        """Return the rows of a measurement that was made; None if it was not.
+
+        Args:
+            asked: What is asked for.
+            walker: What walked, whose names the rows get: the same file may have been elsewhere.
+        """
         path = self._path(asked)
         if not path.is_file():
             return None
         saved = read_json(path)
-        return saved["rows"] if saved.get("asked") == asked else None
+        if saved.get("asked") != asked:
+            return None
+        named = {"policy": walker.name, "method": walker.method}
+        return [row | {"label": walker.label(row["beta"])} | named for row in saved["rows"]]
 
-    def write(self, asked: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> None:
-        """Keep the rows of a measurement.
+    def write(
+        self, asked: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]
+    ) -> list[dict[str, Any]]:
+        """Keep the rows of a measurement, and return them with what they were measured with.
 
         Raises:
             DiskError: If they cannot be written.
         """
-        write_json(self._path(asked), {"asked": asked, "rows": list(rows)})
+        kept = [{**row, **self._made_with} for row in rows]
+        suffix = DIRTY if self._made_with["commit"].endswith(DIRTY) else ""
+        write_json(self._path(asked, suffix), {"asked": asked, "rows": kept})
+        return kept
 
-    def _path(self, asked: Mapping[str, Any]) -> Path:
-        return self._folder / f"{digest_of(asked)}.json"
+    def _path(self, asked: Mapping[str, Any], suffix: str = "") -> Path:
+        return self._folder / f"{digest_of(asked)}{suffix}.json"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import math
 from collections.abc import Iterable
 
@@ -17,6 +18,7 @@ from mute.learning import estimator_trainer as estimation
 from mute.learning.estimator_trainer import EstimatorTrainer, Labels, estimator_losses
 from mute.learning.runner import MuteRunner
 from mute.networks.estimator import Estimate, Estimator, EstimatorCfg
+from mute.tasks import make_task
 
 OBS_DIM, NUM_HEIGHTS, NUM_ENVS, NUM_STEPS = 2, 3, 3, 20
 PRIVILEGED = {"base_lin_vel": slice(0, 3), "heights": slice(3, 6), "contact": slice(6, 10)}
@@ -55,7 +57,8 @@ def _make_case() -> tuple[Estimate, torch.Tensor, Labels]:
 CFG = EstimationCfg(network=NETWORK, lambda_fwd=3.0, lambda_phase=5.0, lambda_kl=0.1)
 # v: (1 + 9) / 6; h: 0.04 / 4 in m^2, over 0.1^2.
 L_EST = 10.0 / 6.0 + 1.0
-# KL of the first step: (1/2)(1) + (1/2)(2 - 1 - ln 2); of the second (1/2)(4); mean of the two.
+# KL of the first step: (1/2)(1) + (1/2)(2 - 1 - ln 2); of the second (1/2)(4); mean of the two,
+# though no next observation follows the second: of an LSTM, all steps count.
 KL = (0.5 + 0.5 * (1.0 - math.log(2.0)) + 2.0) / 2.0
 # o_{t+1}: only the first step counts, (0 + 4) / 2.
 L_FWD = 2.0 + 0.1 * KL
@@ -88,6 +91,41 @@ def test_the_kl_is_summed_over_the_latent_and_averaged_over_the_batch():
     labels.next_valid = torch.zeros(2, 1, dtype=torch.bool)
     losses = estimator_losses(wide, decoded, labels, CFG, HEIGHT_SCALE)
     assert float(losses.forward) == pytest.approx(0.1 * 8 * 0.5, rel=1e-5)
+
+
+HISTORY = dataclasses.replace(CFG, network=dataclasses.replace(NETWORK, encoder="history"))
+# Of a window of observations the KL counts where the next one does: at the first step alone.
+KL_OF_HISTORY = 0.5 + 0.5 * (1.0 - math.log(2.0))
+
+
+def test_the_kl_of_a_window_of_observations_is_masked_at_the_ends_of_episodes():
+    estimate, decoded, labels = _make_case()
+    losses = estimator_losses(estimate, decoded, labels, HISTORY, HEIGHT_SCALE)
+    assert float(losses.forward) == pytest.approx(2.0 + 0.1 * KL_OF_HISTORY, rel=1e-5)
+    wild = estimate.latent_mean.clone()
+    wild[1] = 1.0e3
+    other = estimate._replace(latent_mean=wild.requires_grad_())
+    losses_too = estimator_losses(other, decoded, labels, HISTORY, HEIGHT_SCALE)
+    assert losses_too.total.item() == losses.total.item()
+    losses_too.total.backward()
+    assert wild.grad is not None
+    assert torch.equal(wild.grad[1], torch.zeros_like(wild.grad[1]))
+    assert torch.all(wild.grad[0, 0, 0] > 0.0)
+
+
+def test_with_no_next_observation_at_all_the_kl_of_a_window_is_zero_and_not_nan():
+    estimate, decoded, labels = _make_case()
+    labels.next_valid = torch.zeros_like(labels.next_valid)
+    losses = estimator_losses(estimate, decoded, labels, HISTORY, HEIGHT_SCALE)
+    assert losses.forward.item() == 0.0
+
+
+@pytest.mark.parametrize(("task", "masked"), [("go1_dreamwaq", True), ("go1_mute", False)])
+def test_dreamwaqs_kl_is_masked_and_mutes_is_over_all_steps(task, masked):
+    cfg = dataclasses.replace(make_task(task).agent.estimation, lambda_kl=0.1)
+    expected = 2.0 + 0.1 * (KL_OF_HISTORY if masked else KL)
+    losses = estimator_losses(*_make_case(), cfg, HEIGHT_SCALE)
+    assert float(losses.forward) == pytest.approx(expected, rel=1e-5)
 
 
 def test_a_next_observation_of_another_episode_does_not_count():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -52,24 +53,48 @@ def test_labels_name_beta_where_it_changes_something():
     assert mute.training_seed == 0
 
 
+def _kept(folder: Path, commit: str = "x", calibration: str = "c") -> Kept:
+    made_with = {"commit": commit, "machine": "m"}
+    return Kept(folder, {"calibration_sha256": calibration} | made_with)
+
+
 def test_rows_are_read_back_for_the_very_same_measurement_alone(tmp_path):
-    kept = Kept(tmp_path, {"calibration_sha256": "c", "commit": "x"})
+    kept = _kept(tmp_path)
     (job,) = jobs(WALKERS, QUICK, ("sweep",))
     asked = kept.asked(job, QUICK, 1)
-    assert kept.read(asked) is None
-    kept.write(asked, [{"mnl_mean": 60.0}])
-    assert Kept(tmp_path, {"calibration_sha256": "c", "commit": "x"}).read(asked) == [
-        {"mnl_mean": 60.0}
-    ]
+    assert kept.read(asked, job.walker) is None
+    rows = kept.write(asked, [{"mnl_mean": 60.0, "beta": 0.5}])
+    assert rows == [{"mnl_mean": 60.0, "beta": 0.5, "commit": "x", "machine": "m"}]
     other = dataclasses.replace(job, walker=_make_walker(MUTE, "2"))
     changed = [
         kept.asked(job, QUICK, 2),
         kept.asked(job, QUICK.with_trials(3), 1),
         kept.asked(other, QUICK, 1),
-        Kept(tmp_path, {"calibration_sha256": "d", "commit": "x"}).asked(job, QUICK, 1),
-        Kept(tmp_path, {"calibration_sha256": "c", "commit": "y"}).asked(job, QUICK, 1),
+        _kept(tmp_path, calibration="d").asked(job, QUICK, 1),
     ]
-    assert all(kept.read(each) is None for each in changed)
+    assert all(kept.read(each, job.walker) is None for each in changed)
+
+
+def test_rows_of_another_commit_tell_theirs_and_have_the_names_that_are_asked_for(tmp_path):
+    (job,) = jobs(WALKERS, QUICK, ("sweep",))
+    first, later = _kept(tmp_path, "x"), _kept(tmp_path, "y")
+    first.write(first.asked(job, QUICK, 1), [{"mnl_mean": 60.0, "beta": 0.5, "label": "old"}])
+    named = dataclasses.replace(job.walker, method="no LSTM", name="elsewhere.pt")
+    rows = later.read(later.asked(job, QUICK, 1), named)
+    assert rows is not None
+    (row,) = rows
+    assert (row["commit"], row["mnl_mean"]) == ("x", 60.0)
+    assert (row["label"], row["policy"]) == ("no LSTM, beta 0.5", "elsewhere.pt")
+
+
+def test_rows_of_a_tree_that_differs_from_its_commit_are_not_read_back(tmp_path):
+    (job,) = jobs(WALKERS, QUICK, ("sweep",))
+    dirty = _kept(tmp_path, "x-dirty")
+    asked = dirty.asked(job, QUICK, 1)
+    dirty.write(asked, [{"beta": 0.5}])
+    assert dirty.read(asked, job.walker) is None
+    assert _kept(tmp_path).read(asked, job.walker) is None
+    assert len(list(tmp_path.iterdir())) == 1  # for who looks for it
 
 
 @pytest.mark.parametrize("extent", [FULL, QUICK])
