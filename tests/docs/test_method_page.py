@@ -10,7 +10,8 @@ from places import REPOSITORY
 
 from mute.envs.commands import CommandSampler
 from mute.envs.rewards import paper_terms
-from mute.tasks import FLAT_TASK, make_task
+from mute.evaluation.trials import evaluation_cfg
+from mute.tasks import FLAT_TASK, INDOOR_TASK, make_task
 
 _PAGE = " ".join((REPOSITORY / "docs" / "method.md").read_text().split())
 _CFG = make_task(FLAT_TASK)
@@ -117,3 +118,40 @@ def test_the_page_tells_the_sizes_and_the_passes():
     assert f"Networks are {hidden}; PPO makes {ppo.num_learning_epochs} passes" in _PAGE
     assert f"a KL divergence of {ppo.desired_kl:g} " in _PAGE
     assert f"starts with a deviation of {_CFG.agent.init_std:g}" in _PAGE
+
+
+def _told_of(task: str) -> str:
+    """Return the section of a task, in one line."""
+    page = (REPOSITORY / "docs" / "method.md").read_text()
+    start = page.index(f"\n## `{task}`\n")
+    return " ".join(page[start : page.index("\n## ", start + 1)].split())
+
+
+def test_the_page_tells_the_figures_of_the_recipe_indoors():
+    cfg, told = make_task(INDOOR_TASK), _told_of(INDOOR_TASK)
+    env, ground = cfg.env, cfg.env.terrain
+    lowest, highest = ground.first_levels
+    assert lowest == highest
+    assert f"Levels begin at {lowest}; who gets {ground.crossed:g} m away goes up." in told
+    share = {5.0: "a fifth"}[1.0 / ground.turning_share]
+    assert f"a velocity command lasts {ground.command_time:g} s and turns {share} as fast" in told
+    assert f"as commands of {_CFG.env.commands.resampling_time:g} s cross nothing" in told
+    ours, flat = env.rewards.terms.keys(), _CFG.env.rewards.terms.keys()
+    (added,), (gone,) = ours - flat, flat - ours
+    assert f"`{added}` in place of `{gone}`" in told
+    assert f"Physics steps are {1000.0 * env.scene.timestep:g} ms" in told
+    softest, stiffest = env.randomization.floor_stiffness
+    assert f"their stiffness is {softest:g} to {stiffest:g} of it" in told
+    start, end = env.rewards.quiet_ramp
+    assert f"What beta scales grows in from {start:g} s to {end:g} s" in told
+    assert env.engine == "mujoco" and "MuJoCo's own physics on every device" in told
+    settling = f"{100.0 * cfg.agent.settling_share:g} % of {cfg.agent.iterations} iterations"
+    assert f"fall over the last {settling}, which are as many as on flat ground" in told
+    many = cfg.agent.settling_share * cfg.agent.iterations
+    assert many == pytest.approx(_CFG.agent.settling_share * _CFG.agent.iterations, rel=0.01)
+
+
+def test_whatever_measures_the_recipe_indoors_has_the_physics_steps_that_the_page_tells():
+    measured = evaluation_cfg(make_task(INDOOR_TASK).env, num_envs=1, seconds=1.0, seed=0)
+    steps = f"{1000.0 * measured.scene.timestep:g} ms"
+    assert f"Whatever measures the policy has steps of {steps}." in _told_of(INDOOR_TASK)

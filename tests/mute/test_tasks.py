@@ -62,13 +62,36 @@ def test_the_default_task_asks_for_more_lift_than_the_papers():
 def test_the_recipe_indoors_is_the_flat_one_over_ground():
     flat, indoor = make_task(FLAT_TASK), make_task(INDOOR_TASK)
     assert (flat.env.terrain.kind, indoor.env.terrain.kind) == ("flat", "indoor")
-    assert indoor.env.step_dt == flat.env.step_dt
-    assert indoor.env.randomization.floor_stiffness == (0.5, 1.0)
     ours, theirs = indoor.env.rewards.terms, flat.env.rewards.terms
     assert ours.keys() ^ theirs.keys() == {"lean", "tilt"}
     assert all(ours[name] == theirs[name] for name in ours.keys() & theirs.keys())
-    assert indoor.agent.ppo == flat.agent.ppo
-    assert indoor.agent.estimation == flat.agent.estimation
+    assert (ours["lean"].weight, ours["lean"].group) == (theirs["tilt"].weight, "lift")
+    rewards = {"terms": theirs, "quiet_ramp": flat.env.rewards.quiet_ramp}
+    assert dataclasses.replace(indoor.env.rewards, **rewards) == flat.env.rewards
+    assert indoor.env.commands == flat.env.commands
+    robots = {"floor_stiffness": flat.env.randomization.floor_stiffness}
+    assert dataclasses.replace(indoor.env.randomization, **robots) == flat.env.randomization
+    agent = {"iterations": flat.agent.iterations, "settling_share": flat.agent.settling_share}
+    assert dataclasses.replace(indoor.agent, **agent) == flat.agent
+
+
+def test_the_recipe_indoors_has_the_figures_that_ground_takes():
+    flat, indoor = make_task(FLAT_TASK), make_task(INDOOR_TASK)
+    env = indoor.env
+    assert env.rewards.quiet_ramp == (300.0, 800.0)
+    assert flat.env.rewards.quiet_ramp[1] < env.rewards.quiet_ramp[0]  # ground is learnt aloud
+    assert (env.scene.timestep, env.decimation) == (0.01, 2)
+    assert env.step_dt == flat.env.step_dt
+    # In longer steps of physics no floor is stiffer than the scene's.
+    assert env.randomization.floor_stiffness == (0.5, 1.0)
+    assert env.scene.floor_solref[0] == 2.0 * env.scene.timestep
+    assert env.engine == "mujoco"
+    ground = env.terrain
+    assert (ground.first_levels, ground.crossed, ground.curriculum) == ((0, 0), 3.0, True)
+    assert (ground.command_time, ground.turning_share) == (5.0, 0.2)
+    falling = [task.agent.settling_share * task.agent.iterations for task in (flat, indoor)]
+    assert indoor.agent.iterations > flat.agent.iterations
+    assert falling[1] == pytest.approx(falling[0], rel=0.01)
 
 
 @pytest.mark.parametrize("task", task_names())

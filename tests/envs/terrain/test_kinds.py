@@ -65,6 +65,86 @@ def test_heights_are_those_of_what_is_laid_within_reach(name):
         np.testing.assert_allclose(heights[robot].numpy(), seen, atol=1e-5)
 
 
+def _hair(away: float) -> float:
+    """Return the least distance that single precision tells apart for sure so far away, m."""
+    return max(1e-6, 4.0 * float(np.spacing(np.float32(abs(away) + 3.0))))
+
+
+def _edges(ground: BoxGround, simulation: BatchSimulation, xy: torch.Tensor) -> torch.Tensor:
+    """Return points on the edges and in the corners of all that is laid, m.
+
+    Those out of a robot's reach are somewhere else within it. Shape: (robots, points, 2).
+    """
+    ids = ground._boxes
+    pos, quat = (simulation.field(f"geom_{name}")[:, ids] for name in ("pos", "quat"))
+    half = simulation.field("geom_size")[:, ids]
+    turn = 2.0 * torch.atan2(quat[..., 2], quat[..., 0])
+    # A ramp's upper edge, at both of its ends.
+    x = pos[..., 0] + half[..., 2] * turn.sin()
+    middle = torch.stack((x, pos[..., 1]), dim=-1)
+    reach = torch.stack((half[..., 0] * turn.cos(), half[..., 1]), dim=-1)
+    share = torch.rand(pos[..., :2].shape, generator=torch.Generator().manual_seed(2))
+    along = torch.stack((1.0 - 2.0 * share[..., 0], torch.ones_like(share[..., 0])), dim=-1)
+    ways = torch.stack((along, along.flip(-1), torch.ones_like(along)), dim=2)
+    points = middle[:, :, None] + reach[:, :, None] * torch.cat((ways, -ways), dim=2)
+    near = xy[:, None] + (points.flatten(1, 2) - xy[:, None]).clamp(-0.9 * REACH, 0.9 * REACH)
+    return near.float()
+
+
+@pytest.mark.parametrize("away", [0.0, -40.0, 320.0])
+@pytest.mark.parametrize("name", _AWAY)
+def test_an_edge_is_told_where_it_is_laid_and_as_high_as_one_of_its_sides(name, away):
+    ground, simulation = _ground(name)
+    hair = _hair(away)
+    xy = away + 4.0 * (torch.rand(_ROBOTS, 2, generator=torch.Generator().manual_seed(1)) - 0.5)
+    ground.lay(xy)
+    edges = _edges(ground, simulation, xy)
+    signs = torch.tensor([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
+    beside = edges[:, :, None] + hair * signs
+    told, sides = ground.height(edges), ground.height(beside)
+    nearest = (sides - told[..., None]).abs().amin(dim=2)
+    assert float(nearest.max()) <= hair  # ramps rise by less than that
+    for robot in range(_ROBOTS):
+        seen = _seen_from_above(_model_of(simulation, robot), beside[robot].flatten(0, 1))
+        np.testing.assert_allclose(sides[robot].flatten().numpy(), seen, atol=1e-5 + hair)
+    steps = sides.amax(dim=2) - sides.amin(dim=2)
+    if name != "slopes":
+        assert int((steps > 1e-3).sum()) > 3  # there were edges
+
+
+@pytest.mark.parametrize("name", ["stairs", "stairs_down"])
+def test_a_steps_edge_belongs_to_it(name):
+    ground, _ = _ground(name, LEVELS)
+    top = 0.0 if name == "stairs_down" else 4.5
+    away = 1.2 + TREAD * torch.arange(8, dtype=torch.float64)  # of the edges from a hill's middle
+    edges = torch.cat((top - away, top + away))
+    steps = torch.arange(8, 0, -1).repeat(2)
+    lowest = -8.0 if name == "stairs_down" else 0.0
+    height = torch.tensor(FIGURES["riser"])[:, None] * (steps + lowest)
+    points = torch.stack((edges, torch.zeros_like(edges)), dim=1).float().expand(LEVELS, -1, -1)
+    torch.testing.assert_close(ground.height(points), height)
+
+
+@pytest.mark.parametrize("forward", [True, False])
+@pytest.mark.parametrize("name", _AWAY)
+def test_ground_lies_around_robots_from_one_boundary_of_a_cell_to_the_other(name, forward):
+    ground, simulation = _ground(name)
+    generator = torch.Generator().manual_seed(0)
+    near = TREAD * torch.randint(-12, 12, (_ROBOTS, 2), generator=generator).double()
+    hair = 1e-6 * torch.tensor([-1.0, 0.0, 1.0]).repeat(_ROBOTS // 3)[:, None]
+    ends = [near + hair, near + TREAD - 2e-6]
+    around = 2.0 * REACH * (torch.rand(_ROBOTS, 60, 2, generator=generator) - 0.5)
+    around[:, :20] = REACH * around[:, :20].sign()
+    for xy in ends if forward else reversed(ends):
+        xy = xy.float()
+        ground.lay(xy)
+        points = xy[:, None] + 0.999 * around
+        heights = ground.height(points)
+        for robot in range(_ROBOTS):
+            seen = _seen_from_above(_model_of(simulation, robot), points[robot])
+            np.testing.assert_allclose(heights[robot].numpy(), seen, atol=1e-5)
+
+
 @pytest.mark.parametrize("name", KINDS)
 def test_robots_begin_on_level_ground_at_height_zero(name):
     ground, _ = _ground(name)
