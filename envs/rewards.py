@@ -97,6 +97,10 @@ class RewardsCfg:
     guide_ramp: tuple[float, float] = (0.0, 0.0)
     """The same for the guide group, whose weight falls from 1 to 0: once the robot walks, its gait
     is its own. With (0, 0) it has none."""
+    never_negative: bool = False
+    """Whether a control step pays no less than nothing, as in legged_gym
+    (`only_positive_rewards`): where the penalties of a robot that knows nothing outweigh what it
+    earns, it learns to fall soon."""
 
     def __post_init__(self) -> None:
         """Fill in parameters that are left out, and check everything.
@@ -232,4 +236,7 @@ class RewardSum:
         weighted[self._rows["lift"]] *= lift
         weighted[self._rows["guide"]] *= guide
         means = weighted.mean(dim=1) / self._step_dt
-        return weighted.sum(dim=0), dict(zip(self.names, means.unbind(), strict=True))
+        total = weighted.sum(dim=0)
+        if self.cfg.never_negative:
+            total.clamp_(min=0.0)
+        return total, dict(zip(self.names, means.unbind(), strict=True))

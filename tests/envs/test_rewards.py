@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
@@ -93,6 +94,16 @@ def test_the_shares_are_means_per_second_and_add_up_to_the_reward():
         {"lin_vel_tracking": 0.9, "lin_vel_z": -5.0}
     )
     assert reward.mean().item() == pytest.approx((0.9 - 5.0) * STEP_DT)
+
+
+def test_a_reward_may_be_told_to_pay_no_less_than_nothing():
+    cfg = _make_cfg(lin_vel_z=-2.0, lin_vel_tracking=1.0)
+    motion = make_motion(base_lin_vel=[[0.0, 0.0, 0.0], [0.0, 0.0, 3.0]])
+    free, shares = _make_sum(cfg)(motion, 1.0, 1.0, 1.0)
+    assert float(free[0]) > 0.0 > float(free[1])
+    floored, same = _make_sum(dataclasses.replace(cfg, never_negative=True))(motion, 1.0, 1.0, 1.0)
+    assert floored.tolist() == [float(free[0]), 0.0]
+    assert same == shares  # what each term says is what it says
 
 
 def test_a_term_without_weight_is_neither_evaluated_nor_listed():
