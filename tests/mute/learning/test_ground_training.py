@@ -14,7 +14,7 @@ from mute.envs.randomization import full_randomization
 from mute.envs.terrain import BoxGround, TerrainCfg
 from mute.learning.runner import MuteRunner
 
-_LEVELS = {"Ground/level_rooms", "Ground/level_stairs", "Ground/level_stairs_down"}
+_LEVELS = {f"Ground/level_{name}" for name in ("rooms", "blocks", "stairs", "stairs_down")}
 
 
 def _runner(directory: Path | None, iterations: int = 3) -> MuteRunner:
