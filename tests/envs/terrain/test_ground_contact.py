@@ -9,26 +9,20 @@ import mujoco
 import numpy as np
 import pytest
 import torch
+from ground_helpers import make_ground
 
 from mute.envs.batch_simulation import BatchSimulation
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
-from mute.envs.scene import SceneCfg, build_scene
 from mute.envs.terrain import KINDS, BoxGround, TerrainCfg
-from mute.envs.terrain.draws import KEYS
 from mute.envs.terrain.figures import FIGURES, LEVELS, TREAD
 from mute.envs.terrain.layout import CAP, REACH
 
 
 def _laid(kind: str, xy: torch.Tensor) -> tuple[BoxGround, BatchSimulation]:
     """Return ground of all levels in turn that is laid around robots. Places: (robots, 2), m."""
-    robots = len(xy)
-    model = build_scene(SceneCfg(ground_boxes=KINDS[kind].boxes), pictured=False)
-    simulation = BatchSimulation(model, robots)
-    ground = BoxGround(simulation, [kind] * robots)
-    ground.level = torch.arange(robots) % LEVELS
-    ground.key = torch.randint(KEYS, (robots,), generator=torch.Generator().manual_seed(5))
+    ground, simulation = make_ground(kind, len(xy), seed=5)
     ground.lay(xy)
     return ground, simulation
 

@@ -6,11 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 import torch
+from ground_helpers import make_ground
 
 from mute.envs.batch_simulation import BatchSimulation
-from mute.envs.scene import SceneCfg, build_scene
 from mute.envs.terrain import KINDS, BoxGround
-from mute.envs.terrain.draws import KEYS
 from mute.envs.terrain.figures import FIGURES, LEVELS, TREAD
 from mute.envs.terrain.layout import REACH
 
@@ -19,13 +18,7 @@ _AWAY = [name for name in KINDS if name != "flat"]
 
 
 def _ground(name: str, robots: int = _ROBOTS) -> tuple[BoxGround, BatchSimulation]:
-    model = build_scene(SceneCfg(ground_boxes=KINDS[name].boxes), pictured=False)
-    simulation = BatchSimulation(model, robots)
-    ground = BoxGround(simulation, [name] * robots)
-    generator = torch.Generator().manual_seed(3)
-    ground.level = torch.arange(robots) % LEVELS
-    ground.key = torch.randint(KEYS, (robots,), generator=generator)
-    return ground, simulation
+    return make_ground(name, robots, seed=3)
 
 
 def _model_of(simulation: BatchSimulation, robot: int) -> mujoco.MjModel:

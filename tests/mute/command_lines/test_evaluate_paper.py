@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from comparison_rows import make_row
 from dreamwaq_helpers import write_dreamwaq_policy
 from places import SHIPPED_POLICY
 from policy_variants import write_variant
@@ -17,30 +18,25 @@ from mute.command_lines import evaluate, evaluate_paper, paper_calibration, pape
 from mute.command_lines.card_comparison import comparison_report
 from mute.support.errors import MuteError
 
-_SOURCES = ("impacts", "body", "drive", "scuffing", "fan")
-
 
 def _row(label: str, part: str, surface: str, beta: float, speed: float) -> dict[str, Any]:
     mnl = {"MPC": 75.0, "DreamWaQ": 72.0}.get(label, 69.0 - 3.0 * beta) + speed
-    return {
-        "part": part,
-        "label": label,
-        "policy": f"{label}.pt",
-        "training_seed": 3,
-        "method": label.partition(",")[0],
-        "beta": beta,
-        "surface": surface,
-        "command_speed": speed,
-        "speed_mean": 0.9 * speed,
-        "mnl_mean": mnl,
-        "mnl_std": 0.4,
-        "pnl_mean": mnl + 4.0,
-        "pnl_std": 1.25,
-        "velocity_error_sq": 0.01 * (1.0 + beta),
-        "trials": 20,
-        "trials_heard": 18 if (label, surface) == ("MPC", "tile") else 20,
-        "fall_rate": 0.2 if (label, surface) == ("MPC", "tile") else 0.05,
-    } | {f"laeq_{source}": 50.0 + index for index, source in enumerate(_SOURCES)}
+    falls = (label, surface) == ("MPC", "tile")
+    return make_row(
+        *(label, mnl, surface, speed),
+        part=part,
+        policy=f"{label}.pt",
+        training_seed=3,
+        method=label.partition(",")[0],
+        beta=beta,
+        speed_mean=0.9 * speed,
+        mnl_std=0.4,
+        pnl_mean=mnl + 4.0,
+        pnl_std=1.25,
+        velocity_error_sq=0.01 * (1.0 + beta),
+        trials_heard=18 if falls else 20,
+        fall_rate=0.2 if falls else 0.05,
+    )
 
 
 @pytest.fixture(autouse=True)
@@ -115,8 +111,8 @@ def test_all_of_it_really_runs_in_small_and_is_read_back_the_second_time(
     assert (tmp_path / "comparison.md").read_text() == report
 
 
-def test_what_was_stopped_goes_on_where_it_was(tmp_path, measured, monkeypatch):
-    words = ["paper", "--parts", "levels,sweep", "--out", str(tmp_path)]
+def _stop_after_two(words: list[str], measured: list[str]) -> None:
+    """Run the command, and interrupt it once two measurements are made."""
     measure = paper_measurements.measure
 
     def stopped(job, *rest: Any) -> list[dict[str, Any]]:
@@ -124,12 +120,17 @@ def test_what_was_stopped_goes_on_where_it_was(tmp_path, measured, monkeypatch):
             raise KeyboardInterrupt
         return measure(job, *rest)
 
-    monkeypatch.setattr(paper_measurements, "measure", stopped)
-    with pytest.raises(KeyboardInterrupt):
-        evaluate.main(words)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(paper_measurements, "measure", stopped)
+        with pytest.raises(KeyboardInterrupt):
+            evaluate.main(words)
+
+
+def test_what_was_stopped_goes_on_where_it_was(tmp_path, measured):
+    words = ["paper", "--parts", "levels,sweep", "--out", str(tmp_path)]
+    _stop_after_two(words, measured)
     assert not (tmp_path / "comparison.json").exists()
     first = list(measured)
-    monkeypatch.setattr(paper_measurements, "measure", measure)
     assert evaluate.main(words) == 0
     assert measured[:2] == first == ["levels MPC wood", "levels MPC carpet"]
     assert len(set(measured)) == len(measured)  # none twice
@@ -216,21 +217,9 @@ def test_a_part_alone_leaves_the_others_in_the_report(tmp_path, measured, walked
     assert _found(tmp_path) == found
 
 
-def test_parts_of_other_settings_or_not_whole_are_not_in_the_report(
-    tmp_path, measured, walked, monkeypatch
-):
+def test_parts_of_other_settings_or_not_whole_are_not_in_the_report(tmp_path, measured, walked):
     words = ["paper", "--no-mpc", "--out", str(tmp_path)]
-    measure = paper_measurements.measure
-
-    def stopped(job, *rest: Any) -> list[dict[str, Any]]:
-        if len(measured) == 2:
-            raise KeyboardInterrupt
-        return measure(job, *rest)
-
-    monkeypatch.setattr(paper_measurements, "measure", stopped)
-    with pytest.raises(KeyboardInterrupt):
-        evaluate.main(words)
-    monkeypatch.setattr(paper_measurements, "measure", measure)
+    _stop_after_two(words, measured)
     assert evaluate.main([*words, "--parts", "sweep"]) == 0
     assert (_found(tmp_path)["levels"], _found(tmp_path)["walk"]) == ([], None)
     assert evaluate.main([*words, "--parts", "levels,walk"]) == 0
