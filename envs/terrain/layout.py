@@ -11,6 +11,9 @@ __all__ = ["CAP", "DEPTH", "HALF_WIDTH", "REACH", "WIDE", "Layout", "boxes", "jo
 DEPTH = 0.3
 """How far a box reaches below the plane that all boxes stand on, m: no foot gets under one."""
 
+_SUNK = 0.5 * DEPTH
+"""How far below that plane the top is of a box that is out of the way, m."""
+
 REACH = 0.6
 """Distance from the trunk, m, up to which there has to be ground: feet are at most 0.45 m away, and
 all of a robot that falls within it."""
@@ -51,7 +54,7 @@ def boxes(
         base: Height of the plane. Shape: (n, 1).
     """
     bottom = torch.minimum(base, top) - DEPTH
-    top = torch.where(top > base, top, base - 0.5 * DEPTH)
+    top = torch.where(top > base, top, base - _SUNK)
     pos = torch.stack((0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]), 0.5 * (top + bottom)), dim=-1)
     half = torch.stack((0.5 * (x[1] - x[0]), 0.5 * (y[1] - y[0]), 0.5 * (top - bottom)), dim=-1)
     return Layout(pos, half.clamp(min=1e-3), torch.zeros_like(top))
@@ -81,7 +84,7 @@ def told_apart(layout: Layout, xy: torch.Tensor, base: torch.Tensor, step: float
     far = upright & (away > REACH + step).any(dim=-1)
     deep = half[..., :2].square().sum(dim=-1) / (2.0 * CAP)
     depth = torch.where(upright, torch.maximum(deep, half[..., 2]), half[..., 2])
-    top = torch.where(far, base[:, None].double() - 0.5 * DEPTH, top)
+    top = torch.where(far, base[:, None].double() - _SUNK, top)
     pos[..., 2] = torch.where(upright, top - depth, pos[..., 2])
     half[..., 2] = depth
     return Layout(pos, half, layout.pitch)

@@ -21,7 +21,7 @@ from mute.command_lines.card_results import ResultFiles, results_page
 from mute.command_lines.card_sound import predicted_and_measured
 from mute.command_lines.card_tables import with_part
 from mute.command_lines.card_terrain import terrain_figures, terrain_speed
-from mute.command_lines.card_trainings import read_recipe
+from mute.command_lines.card_trainings import CARD, Recipe, read_recipe
 from mute.evaluation.paper_levels import PAPER_LEVELS
 from mute.evaluation.tables import read_json
 from mute.support.errors import MuteError
@@ -125,10 +125,10 @@ def read_results(args: CardArgs) -> ResultFiles:
         MuteError: If one is missing, or not what the command wrote.
     """
     beside = args.noise.parent
-    flat = args.reliability / FLAT_TASK
+    flat = (args.reliability / FLAT_TASK).is_dir()
     return ResultFiles(
-        ships=read_recipe(DEFAULT_TASK, args.card, args.reliability / DEFAULT_TASK),
-        flat=read_recipe(FLAT_TASK, args.flat_card, flat) if flat.is_dir() else None,
+        ships=_recipe(DEFAULT_TASK, args.card, args.reliability),
+        flat=_recipe(FLAT_TASK, args.flat_card, args.reliability) if flat else None,
         paper_task=_read(_DOCS / "go1_mute_paper.json"),
         noise=_read_rows(args.noise, *_LEVELS, *(f"laeq_{name}" for name in SOURCES)),
         sweep_speed=_read_rows(beside / "sweep_speed.json", *_LEVELS),
@@ -137,6 +137,10 @@ def read_results(args: CardArgs) -> ResultFiles:
         fitted=_fitted_row(),
         calibration=file_sha256(CALIBRATION_FILE),
     )
+
+
+def _recipe(task: str, card: Path, folder: Path) -> Recipe:
+    return read_recipe(task, _read(card, *CARD), folder / task)
 
 
 _SPEED = ("rates", "options", "num_envs", "turns", "timestep", "machine")

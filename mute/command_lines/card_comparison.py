@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -36,7 +37,7 @@ def comparison_report(found: Mapping[str, Any]) -> str:
     rows, sweep, walk = found["levels"], found["sweep"], found["walk"]
     parts = [_head(found), _walkers_table(found["walkers"])]
     fitted = _fitted_cell(found)
-    parts += ["## The constant", _constant_text(found["calibration"])]
+    parts += ["## The constant", _constant_text(found["calibration"], fitted)]
     told = verdicts(rows, sweep, walk, fitted)
     if told:
         parts += ["## What the paper found, here", _verdicts_table(told)]
@@ -74,20 +75,21 @@ def _before(found: Mapping[str, Any]) -> str:
 
 def measured_before(found: Mapping[str, Any]) -> list[str]:
     """Return what was measured with another commit or machine than the rest, a line for each."""
-    made_with = {name: found[name] for name in MADE_WITH}
-    counts: dict[tuple[str, ...], int] = {}
-    for row in (*found["calibration"]["fits"], *found["levels"], *found["sweep"]):
-        if {name: row[name] for name in MADE_WITH} != made_with:
-            at = tuple(row[name] for name in MADE_WITH)
-            counts[at] = counts.get(at, 0) + 1
+    now = _made_with(found)
+    rows = (*found["calibration"]["fits"], *found["levels"], *found["sweep"])
+    counts = Counter(at for at in map(_made_with, rows) if at != now)
     told = [
         f"{count} setting{'s' * (count > 1)} at commit {commit} on {machine}"
         for (commit, machine), count in counts.items()
     ]
     walk = found["walk"]
-    if walk is not None and {name: walk[name] for name in MADE_WITH} != made_with:
+    if walk is not None and _made_with(walk) != now:
         told.append(f"the long walk at commit {walk['commit']} on {walk['machine']}")
     return told
+
+
+def _made_with(row: Row) -> tuple[str, ...]:
+    return tuple(row[name] for name in MADE_WITH)
 
 
 def _walkers_table(walkers: Sequence[Row]) -> str:
@@ -108,13 +110,13 @@ def _fitted_cell(found: Mapping[str, Any]) -> tuple[str, str] | None:
     return (used["label"], used["floor"]) if known else None
 
 
-def _constant_text(calibration: Mapping[str, Any]) -> str:
+def _constant_text(calibration: Mapping[str, Any], fitted: tuple[str, str] | None) -> str:
     used, fits = calibration["in_use"], calibration["fits"]
     share = used["transmissibility"]
     to_what = (
         "what it is fitted to, its file does not say."
-        if used["label"] is None or used["floor"] is None
-        else f"fitted such that {used['label']} has the paper's MNL on {used['floor']} at "
+        if fitted is None
+        else f"fitted such that {fitted[0]} has the paper's MNL on {fitted[1]} at "
         f"{EQUAL_SPEED:g} m/s{_with_policy(used)}. That level is marked in the table, and counts "
         "nowhere as predicted; all else is."
     )

@@ -9,10 +9,9 @@ from typing import Any
 
 from mute.command_lines.card_reliability import SeedFiles, read_seeds
 from mute.command_lines.card_tables import markdown, times
-from mute.evaluation.tables import read_json
 from mute.support.errors import MuteError
 
-__all__ = ["Recipe", "ends", "policy_figures", "read_recipe", "trainings_table"]
+__all__ = ["CARD", "Recipe", "ends", "policy_figures", "read_recipe", "trainings_table"]
 
 _RANGE = {
     "beta": ("beta", "{:g}"),
@@ -39,7 +38,7 @@ _TRAININGS = {
     "slower": ("beta 1 lands slower by", "{:.0%}"),
     "apex": ("apex at beta 0, 1 (cm)", "{}"),
 }
-_CARD = (
+CARD = (
     "seed",
     "figures",
     "command",
@@ -78,25 +77,20 @@ class Recipe:
         return {seed: run.gait for seed, run in self.seeds.items() if run.gait is not None}
 
 
-def read_recipe(task: str, card: Path, folder: Path) -> Recipe:
+def read_recipe(task: str, card: Mapping[str, Any], folder: Path) -> Recipe:
     """Read what was measured of a task's trainings.
 
     Args:
         task: Its name.
-        card: Card of its policy that ships, which `mute.release` wrote.
+        card: Card of its policy that ships, which `mute.release` wrote, with all of `CARD`.
         folder: Directory of `seedN.json` and what lies beside them.
 
     Raises:
-        MuteError: If a file is missing, or not what the command wrote, or trainings are not alike.
+        MuteError: If a seed's file is not what the command wrote, or trainings are not alike.
     """
-    if not card.is_file():
-        raise MuteError(f"no file at {card}")
-    content, seeds = read_json(card), read_seeds(folder)
-    missing = [key for key in _CARD if not isinstance(content, dict) or key not in content]
-    if missing:
-        raise MuteError(f"{card} lacks '{missing[0]}'")
-    _check(folder, content, seeds)
-    return Recipe(task, content, seeds)
+    seeds = read_seeds(folder)
+    _check(folder, card, seeds)
+    return Recipe(task, card, seeds)
 
 
 def _check(folder: Path, card: Mapping[str, Any], seeds: Mapping[int, SeedFiles]) -> None:

@@ -21,6 +21,7 @@ from mute.command_lines.arguments import (
 )
 from mute.command_lines.policy_options import DriverArgs
 from mute.command_lines.sound_options import progress_bar
+from mute.command_lines.targets import print_targets
 from mute.controllers.driver import Driver
 from mute.evaluation.reliability.figures import Figure, PartResult, shown
 from mute.evaluation.reliability.parts import PARTS
@@ -130,19 +131,8 @@ def _report(args: ReliabilityArgs, about: Mapping[str, Any], measured: _Measured
         print(json.dumps(without_nan(content), allow_nan=False))
         return
     _print_starts(measured)
-    rows = [
-        {
-            "part": figure.part,
-            "figure": figure.name,
-            "value": shown(figure.value, figure.unit),
-            "target": figure.target.text(figure.unit),
-            "met": "met" if figure.met else "NOT MET",
-        }
-        for figure in measured.figures
-    ]
-    print_table(f"reliability, {args.robots} robots; levels are modelled", rows, list(rows[0]))
-    met = sum(figure.met for figure in measured.figures)
-    print(f"{met} of {len(rows)} targets are met")
+    title = f"reliability, {args.robots} robots; levels are modelled"
+    print_targets(title, measured.figures)
     print(f"written to {args.out}: {', '.join(names)}")
 
 

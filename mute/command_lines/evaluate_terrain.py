@@ -26,13 +26,13 @@ from mute.command_lines.arguments import (
 )
 from mute.command_lines.policy_options import PolicyArgs
 from mute.command_lines.sound_options import progress_bar
+from mute.command_lines.targets import print_targets
 from mute.controllers import load_policy
 from mute.controllers.learned import Policy
 from mute.envs.terrain import KINDS
 from mute.envs.terrain.figures import LEVELS
 from mute.evaluation.crossing import cross, crossing_cfg
 from mute.evaluation.endurance import HARDSHIPS, LONGEST_PUSHES, be_pushed, bear, walk_at_random
-from mute.evaluation.reliability.figures import shown
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.terrain_targets import terrain_targets
 from mute.support.plain_data import without_nan
@@ -208,8 +208,8 @@ _TITLES = {
 def _report(
     args: TerrainArgs, about: dict[str, Any], tables: dict[str, list[dict[str, Any]]]
 ) -> None:
-    figures = [figure.as_dict() for figure in terrain_targets(tables)]
-    content = about | tables | {"figures": figures}
+    figures = terrain_targets(tables)
+    content = about | tables | {"figures": [figure.as_dict() for figure in figures]}
     write_json(args.out / "terrain.json", content)
     names = ["terrain.json"]
     for part, rows in tables.items():
@@ -220,23 +220,8 @@ def _report(
         return
     for part, rows in tables.items():
         print_table(_TITLES[part].format(args), rows, list(rows[0]))
-    _print_targets(figures)
+    print_targets("targets, at the worst speed", figures)
     print(f"written to {args.out}: {', '.join(names)}")
-
-
-def _print_targets(figures: list[dict[str, Any]]) -> None:
-    if not figures:
-        return
-    rows = [
-        row
-        | {
-            "value": shown(row["value"], row["unit"]),
-            "met": "met" if row["met"] else "NOT MET",
-        }
-        for row in figures
-    ]
-    print_table("targets, at the worst speed", rows, ["part", "name", "value", "target", "met"])
-    print(f"{sum(row['met'] for row in figures)} of {len(figures)} targets are met")
 
 
 def _check(args: TerrainArgs) -> None:

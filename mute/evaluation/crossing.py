@@ -15,7 +15,7 @@ from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import full_randomization
 from mute.envs.scene import FOOT_RADIUS
-from mute.envs.terrain import BoxGround, TerrainCfg
+from mute.envs.terrain import TerrainCfg
 from mute.evaluation.estimation_errors import EstimationMeter
 from mute.evaluation.trials import evaluation_cfg, run_trial
 from mute.evaluation.usual_robots import under_conditions
@@ -155,7 +155,6 @@ def cross(
     estimation = EstimationMeter(env, controller, first_episodes=True)
     baselines = HeightBaselines(env)
     made, along = torch.zeros(2, cfg.num_envs)
-    across = env.ground.across if isinstance(env.ground, BoxGround) else torch.zeros_like(made) > 0
     way: list[torch.Tensor] = []
     fallen = torch.zeros(cfg.num_envs, dtype=torch.bool)
     ended = fallen.clone()
@@ -177,7 +176,7 @@ def cross(
     command = torch.tensor((speed, 0.0, 0.0, beta))
     run_trial(env, controller, command, round(seconds / env.step_dt), watch)
     share, share_of_x = made / (speed * seconds), along / (speed * seconds)
-    enough = (share > _ENOUGH) & (~across | (share_of_x > _ENOUGH))
+    enough = (share > _ENOUGH) & (~env.travelled.across | (share_of_x > _ENOUGH))
     errors = estimation.errors()
     flat, mean = baselines.errors()
     return Crossing(

@@ -44,14 +44,8 @@ def terrain_targets(tables: Mapping[str, _Rows]) -> list[Figure]:
     for (kind, level), least in _CROSSINGS.items():
         shares = [row["success"] for row in crossings if _is_of(row, kind, level)]
         if shares:
-            figures.append(
-                _share(
-                    "crossings",
-                    f"{kind}, level {level}: get across" if kind != "flat" else "flat: get across",
-                    shares,
-                    least,
-                )
-            )
+            where = kind if kind == "flat" else f"{kind}, level {level}"
+            figures.append(_share("crossings", f"{where}: get across", shares, least))
     survived = {row["hardship"]: row["survived"] for row in tables.get("hardships", ())}
     figures += [
         _share("hardships", f"{name}: do not fall", [survived[name]], _SURVIVAL)
