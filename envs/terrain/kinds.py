@@ -111,8 +111,9 @@ class Stairs(Kind):
         riser = _figure("riser", level, xy)[:, None]
         away = (xy[..., 0] - self._middle(xy[..., 0])).abs()
         # Steps that reach as far from the middle of the hill; a step's edge belongs to it.
-        steps = torch.floor((self._half(1) - away) / TREAD + 1.0 + 1e-6)
-        return riser * steps.clamp(0, self.STEPS) + self.base(level)[:, None]
+        reach = self._half(1) + (1.0 + 1e-6) * TREAD
+        steps = torch.floor((reach - away) / TREAD).clamp(0, self.STEPS)
+        return torch.addcmul(self.base(level)[:, None], riser, steps)
 
     def lay(
         self, xy: torch.Tensor, level: torch.Tensor, key: torch.Tensor, wide: bool = False
@@ -250,29 +251,32 @@ class Blocks(Kind):
 
     def height(self, xy: torch.Tensor, level: torch.Tensor, key: torch.Tensor) -> torch.Tensor:
         """Return the height of what lies below each point, see `Kind.height`."""
-        cell = torch.floor(xy / self._CELL).long()
-        x, y, top = self._block(cell[..., 0], cell[..., 1], level, key)
-        inside = (xy[..., 0] >= x[0]) & (xy[..., 0] <= x[1])
-        inside &= (xy[..., 1] >= y[0]) & (xy[..., 1] <= y[1])
-        return torch.where(inside, top, 0.0)
+        place = xy / self._CELL
+        cell = torch.floor(place)
+        i, j, which = _cells(cell)
+        along, across, top = (part.gather(1, which) for part in self._block(i, j, level, key))
+        x, y = ((place - cell - 0.5).abs() * self._CELL).unbind(dim=-1)
+        # Numbers all along: a mask takes four times as long to make, and to use.
+        outside = torch.floor(torch.minimum(along - x, across - y))  # -1, or 0 on the block
+        return torch.addcmul(top, top, outside)
 
     def lay(
         self, xy: torch.Tensor, level: torch.Tensor, key: torch.Tensor, wide: bool = False
     ) -> Layout:
         """Return what lies in three by three cells, see `Kind.lay`."""
         i, j = _window(xy, self._CELL, 13 if wide else 3)
-        x, y, top = self._block(i, j, level, key)
-        return boxes(x, y, top, self.base(level)[:, None])
+        x, y = (i + 0.5) * self._CELL, (j + 0.5) * self._CELL
+        along, across, top = self._block(i, j, level, key)
+        base = self.base(level)[:, None]
+        return boxes((x - along, x + along), (y - across, y + across), top, base)
 
     def _block(
         self, i: torch.Tensor, j: torch.Tensor, level: torch.Tensor, key: torch.Tensor
-    ) -> tuple[tuple[torch.Tensor, torch.Tensor], tuple[torch.Tensor, torch.Tensor], torch.Tensor]:
-        """Return where a cell's block is along x and y, and its height, 0 for none."""
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Return half the length and width of cells' blocks, and their heights, 0 for none."""
         along, across, high = _BLOCKS.to(key.device)[:, in_square(i, j, key)]
-        x, y = (i + 0.5) * self._CELL, (j + 0.5) * self._CELL
         clear = (i.abs() <= 1) & (j.abs() <= 1)  # where robots begin
-        top = torch.where(clear, 0.0, _figure("block", level)[:, None] * high)
-        return (x - along, x + along), (y - across, y + across), top
+        return along, across, torch.where(clear, 0.0, _figure("block", level)[:, None] * high)
 
 
 class Rooms(Kind):
@@ -285,21 +289,23 @@ class Rooms(Kind):
     wide_boxes = 24
     max_heading = 0.25 * pi
     _CELL = 2.4
+    _STEPS = 3
+    """Steps of stairs, and so boxes of a cell."""
 
     def height(self, xy: torch.Tensor, level: torch.Tensor, key: torch.Tensor) -> torch.Tensor:
         """Return the height of what lies below each point, see `Kind.height`."""
-        x = xy[..., 0].contiguous()
-        # What lies in the few cells that a robot's points are in is looked up once for all of them.
-        first, last = (torch.floor(end / self._CELL + 0.5).long() for end in (x.amin(1), x.amax(1)))
-        count = int((last - first).max()) + 1
-        cell = first[:, None] + torch.arange(count, device=x.device)
-        half, rise = self._thing(cell, level, key)
-        height = torch.zeros_like(x)
-        for i in range(count):
-            away = (x - cell[:, i, None] * self._CELL).abs()
-            for its_half, its_rise in zip(half[..., i, None], rise[..., i, None], strict=True):
-                torch.maximum(height, (away <= its_half) * its_rise, out=height)
-        return height
+        place = xy[..., 0] / self._CELL
+        cell = torch.round(place)
+        # The few cells that a robot's points are in are looked up once for all of them.
+        first = cell.amin(dim=1, keepdim=True)
+        cells = torch.arange(int((cell - first).max()) + 1, device=xy.device)
+        which = (cell - first).long()
+        half, steps, rise = (
+            part.gather(1, which) for part in self._thing(first.long() + cells, level, key)
+        )
+        away = (place - cell).abs() * self._CELL
+        covering = torch.floor((half - away) / TREAD + 1.0).clamp(min=0.0)
+        return rise * torch.minimum(covering, steps)
 
     def lay(
         self, xy: torch.Tensor, level: torch.Tensor, key: torch.Tensor, wide: bool = False
@@ -307,22 +313,27 @@ class Rooms(Kind):
         """Return the two things that are nearest, see `Kind.lay`."""
         first = torch.floor(xy[:, :1] / self._CELL).long()
         cell = first + torch.arange(-3 if wide else 0, 5 if wide else 2, device=xy.device)
-        half, rise = (torch.cat(tuple(part), dim=1) for part in self._thing(cell, level, key))
-        middle = (cell * self._CELL).repeat(1, len(_HALVES))
+        half, steps, rise = self._thing(cell, level, key)
+        step = torch.arange(self._STEPS, device=xy.device).repeat_interleave(cell.shape[1])
+        half, steps, rise = (part.repeat(1, self._STEPS) for part in (half, steps, rise))
+        there = step < steps
+        half = torch.where(there, half - TREAD * step, 0.0)
+        top = torch.where(there, rise * (step + 1.0), 0.0)
+        middle = (cell * self._CELL).repeat(1, self._STEPS)
         base = self.base(level)[:, None]
-        return boxes((middle - half, middle + half), _beside(xy, rise.shape[1], wide), rise, base)
+        return boxes((middle - half, middle + half), _beside(xy, top.shape[1], wide), top, base)
 
     def _thing(
         self, cell: torch.Tensor, level: torch.Tensor, key: torch.Tensor
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return half the lengths of a cell's boxes along x, and their heights, 0 for none.
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Return what lies in cells: half the length of its lowest step, how many, how high each.
 
-        Shape of each: (boxes on top of each other, *that of `cell`).
+        All but stairs are a single one. Shape of each: that of `cell`.
         """
         index = along_line(cell, key)
-        half = _HALVES.to(key.device)[:, index]
-        rise = _RISES.to(key.device)[:, level[:, None], index]
-        return half, torch.where(cell == 0, 0.0, rise)  # robots begin in cell 0
+        half, steps = _THINGS.to(key.device)[:, index]
+        rise = _RISES.to(key.device)[level[:, None], index]
+        return half, steps, torch.where(cell == 0, 0.0, rise)  # robots begin in cell 0
 
 
 def _draw_blocks() -> torch.Tensor:
@@ -339,12 +350,13 @@ def _draw_blocks() -> torch.Tensor:
 
 
 def _draw_rooms() -> tuple[torch.Tensor, torch.Tensor]:
-    """Return half the lengths of the boxes in each cell of rooms, and their heights by level.
+    """Return what lies in each cell of rooms, and by level how high it is.
 
-    Shapes: (3, CELLS) and (3, LEVELS, CELLS).
+    Shapes: (2, CELLS), half the length of its lowest step and how many it has, and (LEVELS, CELLS),
+    how high each step is.
     """
     which, size = _UNITS[:2, :CELLS]
-    half, rise = torch.zeros(3, CELLS), torch.zeros(3, LEVELS, CELLS)
+    half, steps, rise = torch.zeros(CELLS), torch.ones(CELLS), torch.zeros(LEVELS, CELLS)
     share = 0.15  # of nothing
     for name, its_share, its_half in (
         ("cable", 0.2, 0.004 + 0.004 * size),
@@ -353,20 +365,19 @@ def _draw_rooms() -> tuple[torch.Tensor, torch.Tensor]:
         ("riser", 0.15, torch.full_like(size, 0.6)),
     ):
         here = (which >= share) & (which < share + its_share)
-        half[0] = torch.where(here, its_half, half[0])
+        half = torch.where(here, its_half, half)
         heights = torch.tensor(FIGURES[name])[:, None] * (0.4 + 0.6 * size)
-        rise[0] = torch.where(here, heights, rise[0])
+        rise = torch.where(here, heights, rise)
         share += its_share
     stairs = which >= share
-    for step in range(3):
-        half[step] = torch.where(stairs, 0.3 + TREAD * (2 - step), half[step])
-        heights = torch.tensor(FIGURES["riser"])[:, None] * (step + 1.0)
-        rise[step] = torch.where(stairs, heights, rise[step])
-    return half, rise
+    half = torch.where(stairs, 0.3 + 2 * TREAD, half)
+    steps = torch.where(stairs, 3.0, steps)
+    rise = torch.where(stairs, torch.tensor(FIGURES["riser"])[:, None], rise)
+    return torch.stack((half, steps)), rise
 
 
 _BLOCKS = _draw_blocks()
-_HALVES, _RISES = _draw_rooms()
+_THINGS, _RISES = _draw_rooms()
 
 KINDS: dict[str, Kind] = {
     "flat": Flat(),
@@ -406,3 +417,22 @@ def _window(xy: torch.Tensor, size: float, row: int) -> tuple[torch.Tensor, torc
     i = (cell[:, 0, None] + around.repeat_interleave(row)).contiguous()
     j = (cell[:, 1, None] + around.repeat(row)).contiguous()
     return i, j
+
+
+def _cells(cell: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Return the cells that a robot's points are in, to be looked up once for all of its points.
+
+    Args:
+        cell: The indices of the cell of each point, whole numbers. Shape: (n, points, 2).
+
+    Returns:
+        The indices of the cells of a rectangle around the points, each of shape (n, cells), and
+        which of these each point is in, of shape (n, points).
+    """
+    x, y = cell.unbind(dim=-1)
+    first_x, first_y = x.amin(dim=1, keepdim=True), y.amin(dim=1, keepdim=True)
+    x, y = x - first_x, y - first_y
+    row = int(y.max()) + 1
+    cells = torch.arange((int(x.max()) + 1) * row, device=cell.device)
+    i, j = first_x.long() + cells // row, first_y.long() + cells % row
+    return i, j, (x * row + y).long()
