@@ -10,7 +10,7 @@ import cattrs
 from mute.config_versions import upgraded
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.networks.estimator import EstimatorCfg
-from mute.support.ranges import Range, check_ranges
+from mute.support.ranges import Range, check_ordered, check_ranges
 
 __all__ = ["AgentCfg", "EstimationCfg", "PPOCfg", "TaskCfg", "from_plain", "to_plain"]
 
@@ -134,6 +134,10 @@ class AgentCfg:
     settling_share: float = 0.0
     """Share of the iterations, the last ones, over which all learning rates fall to zero in a
     straight line: without, the velocity at which a policy walks shifts from one to the next."""
+    late_entropy_share: float = 1.0
+    """What is left of the entropy bonus, `ppo.entropy_coef`, after `entropy_ramp`, as a share."""
+    entropy_ramp: tuple[int, int] = (0, 0)
+    """Iterations in which it falls to that share, in a straight line: the first and the last."""
     save_interval: int = 50
     """Iterations between checkpoints."""
     noise_interval: int = 20
@@ -178,6 +182,8 @@ class AgentCfg:
             "iterations": _COUNT,
             "num_steps_per_env": Range(1, 10000, whole=True),
             "settling_share": _SHARE,
+            "late_entropy_share": _SHARE,
+            "entropy_ramp": Range(0, 10**9, whole=True),
             "save_interval": _COUNT,
             "noise_interval": Range(0, 10**9, whole=True),
             "actor_hidden": _WIDTH,
@@ -193,11 +199,7 @@ class AgentCfg:
             self._check_even_widths()
         elif self.leading_side:
             raise ValueError("agent.leading_side must be false unless agent.symmetric, got true")
-        low, high = self.std_range
-        if low > high:
-            raise ValueError(
-                f"agent.std_range must be (low, high) with low <= high, got {self.std_range}"
-            )
+        check_ordered(self, "agent", "entropy_ramp", "std_range")
 
     def _check_even_widths(self) -> None:
         network = self.estimation.network

@@ -16,6 +16,7 @@ from mute.learning.distributed import Ranks
 from mute.learning.divergence import DivergedError, first_not_finite, stopped_by
 from mute.learning.estimated_env import EstimatedEnv
 from mute.learning.estimator_trainer import EstimatorTrainer
+from mute.learning.exploration import Exploration
 from mute.learning.model import PreparedModel
 from mute.learning.optimizer import FusedAdam
 from mute.learning.settling import Settling
@@ -46,6 +47,8 @@ class EstimatorPPO(PPO):
     """What actor and critic learn by."""
     settling: Settling
     """How learning rates fall at the end."""
+    exploration: Exploration
+    """How the entropy bonus falls."""
     updates: int = 0
     """Number of updates that went well, those before a resumption included."""
     _met: str | None = None
@@ -66,13 +69,19 @@ class EstimatorPPO(PPO):
         return algorithm
 
     def attach(
-        self, env: EstimatedEnv, trainer: EstimatorTrainer, ranks: Ranks, settling: Settling
+        self,
+        env: EstimatedEnv,
+        trainer: EstimatorTrainer,
+        ranks: Ranks,
+        settling: Settling,
+        exploration: Exploration,
     ) -> None:
         """Take on the estimator; to be called once, before anything else.
 
         A live module cannot come through rsl_rl's configuration, which is deep-copied.
         """
-        self.env, self.trainer, self.ranks, self.settling = env, trainer, ranks, settling
+        self.env, self.trainer, self.ranks = env, trainer, ranks
+        self.settling, self.exploration = settling, exploration
         # What rsl_rl's runner would say of ranks on GPUs; here they may learn on CPUs as well.
         self.is_multi_gpu = ranks.several
         self.gpu_world_size, self.gpu_global_rank = ranks.world_size, ranks.rank
@@ -121,6 +130,7 @@ class EstimatorPPO(PPO):
         """
         use_learning_threads()
         self._settle()
+        self.entropy_coef = self.exploration.weight(self.updates)
         # Clones made outside inference mode are ordinary tensors, which autograd accepts.
         state = tuple(part.clone() for part in self._rollout_state)
         losses = self.trainer.update(self.storage, state, self.ranks)

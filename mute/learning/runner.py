@@ -23,6 +23,7 @@ from mute.learning.distributed import Ranks, unnoticed_ranks
 from mute.learning.divergence import DivergedError
 from mute.learning.estimated_env import EstimatedEnv, make_estimator
 from mute.learning.estimator_trainer import EstimatorTrainer
+from mute.learning.exploration import Exploration
 from mute.learning.logger import TrainingLogger, quiet_writer_thread
 from mute.learning.resumption import check_resumption
 from mute.learning.saved_state import (
@@ -122,7 +123,9 @@ class MuteRunner(OnPolicyRunner):
         trainer = EstimatorTrainer(
             estimator, estimation, env.privileged_slices, feet.min_steps, feet.max_steps
         )
-        self.alg.attach(estimated, trainer, self.ranks, Settling.of(cfg.agent))
+        self.alg.attach(
+            estimated, trainer, self.ranks, Settling.of(cfg.agent), Exploration.of(cfg.agent)
+        )
         if cfg.agent.symmetric:
             by_group = groups(env, estimator, estimation.actor_uses_phase)
             tie_actor_critic(self.alg.actor, self.alg.critic, by_group, cfg.agent.leading_side)
