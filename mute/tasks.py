@@ -85,8 +85,16 @@ def _go1_mute_indoor() -> TaskCfg:
             kind="indoor", first_levels=(0, 0), crossed=3.0, command_time=5.0, turning_share=0.2
         ),
     )
-    # The last learning rates fall over as many iterations as on flat ground.
-    agent = dataclasses.replace(task.agent, iterations=3000, settling_share=0.075)
+    agent = dataclasses.replace(
+        task.agent,
+        iterations=3000,
+        # Steps are found with much exploration; then, as levels keep robots at the end of what
+        # they can, it would grow, and robots would follow commands ever worse.
+        late_entropy_share=0.3,
+        entropy_ramp=(650, 750),
+        # The last learning rates fall over as many iterations as on flat ground.
+        settling_share=0.075,
+    )
     return TaskCfg(env=env, agent=agent)
 
 
