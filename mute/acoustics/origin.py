@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from mute.acoustics.body import CALIBRATION_FILE
-from mute.support.provenance import REPOSITORY, current_commit, file_sha256, machine_kind
+from mute.support.provenance import current_commit, file_sha256, machine_kind, place_of
 
 __all__ = ["policy_origin", "sound_origin"]
 
@@ -36,4 +35,4 @@ def policy_origin(policy: Path) -> dict[str, str]:
     Raises:
         MuteError: If it cannot be read.
     """
-    return {"policy": os.path.relpath(policy, REPOSITORY), "policy_sha256": file_sha256(policy)}
+    return {"policy": place_of(policy), "policy_sha256": file_sha256(policy)}

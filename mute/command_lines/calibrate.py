@@ -8,7 +8,6 @@ noise level (MNL) that was measured of the real robot there. All else that the m
 
 from __future__ import annotations
 
-import os
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -49,7 +48,7 @@ from mute.evaluation.tables import write_json
 from mute.evaluation.trials import run_trial
 from mute.evaluation.usual_robots import robots_cfg
 from mute.support.errors import MuteError
-from mute.support.provenance import REPOSITORY, current_commit, file_sha256, machine_kind
+from mute.support.provenance import current_commit, file_sha256, machine_kind, place_of
 from mute.support.ranges import Range
 
 __all__ = ["REFERENCES", "CalibrationArgs", "fit_share", "fitted", "main", "provenance"]
@@ -122,14 +121,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 def provenance(args: CalibrationArgs, policy: Driver) -> dict[str, Any]:
     """Return where a calibration comes from, as plain data; paths are the repository's."""
     options = {
-        "policy": os.path.relpath(args.policy, REPOSITORY),
+        "policy": place_of(args.policy),
         "reference": args.reference,
         "floor": args.floor,
         "speed": f"{args.speed:g}",
         "trials": args.trials,
         "seconds": f"{args.seconds:g}",
         "seed": args.seed,
-        "out": os.path.relpath(args.out, REPOSITORY),
+        "out": place_of(args.out),
     }
     words = [word for name, value in options.items() for word in (f"--{name}", str(value))]
     return {

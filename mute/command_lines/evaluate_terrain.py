@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -36,7 +35,7 @@ from mute.evaluation.endurance import HARDSHIPS, LONGEST_PUSHES, be_pushed, bear
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.terrain_targets import terrain_targets
 from mute.support.plain_data import without_nan
-from mute.support.provenance import REPOSITORY, current_commit, file_sha256, machine_kind
+from mute.support.provenance import current_commit, file_sha256, machine_kind, place_of
 from mute.support.ranges import Range
 from mute.support.signals import exit_status
 
@@ -136,7 +135,7 @@ def terrain(args: TerrainArgs) -> int:
         status = exit_status(stop)
     if tables:
         about = {
-            "policy": os.path.relpath(args.policy, REPOSITORY),
+            "policy": place_of(args.policy),
             "policy_sha256": file_sha256(args.policy),
             "trained_seed": policy.cfg.env.seed,
             "iteration": policy.iteration,

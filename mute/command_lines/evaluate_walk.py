@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,7 +35,7 @@ from mute.evaluation.intervals import mean_with_interval, with_interval
 from mute.evaluation.plotting import check_matplotlib
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.rendering.kept_walks import KeptWalks
-from mute.support.provenance import REPOSITORY
+from mute.support.provenance import place_of
 from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
 
@@ -188,7 +187,7 @@ def _write(
 ) -> list[str]:
     """Write the figures, and the track and the map of the first robot; return the files."""
     about = {
-        "course": os.path.relpath(args.course, REPOSITORY),
+        "course": place_of(args.course),
         **origin,
         "beta": args.beta,
         "course_speed": course.speed,

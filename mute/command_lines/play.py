@@ -50,7 +50,7 @@ from mute.controllers.command import COMMAND_LIMITS, Command
 from mute.controllers.driver import Driver
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.scene import Look
-from mute.envs.terrain import KINDS, TerrainCfg
+from mute.envs.terrain import GROUNDS, TerrainCfg
 from mute.envs.terrain.figures import LEVELS
 from mute.evaluation.session import Session
 from mute.evaluation.trials import evaluation_cfg, from_the_stance
@@ -110,8 +110,9 @@ class PlayArgs(DriverArgs):
     it), with the command half a second later; moving, near the stance with a little speed in any
     direction, as in training."""
     terrain: str = "flat"
-    """Ground to walk on: flat, slopes, uneven, blocks, stairs, stairs_down or rooms. Except on flat
-    ground, pictures have dots: green where it is, orange where the policy takes it to be."""
+    """Ground to walk on: flat, slopes, uneven, blocks, stairs, stairs_down or rooms; indoor or
+    rough, with several robots, each on one of these. Except on flat ground, pictures have dots:
+    green where it is, orange where the policy takes it to be."""
     level: int = 2
     """How difficult it is, 0 to 4."""
     surface: str | None = None
@@ -155,8 +156,8 @@ class PlayArgs(DriverArgs):
         check_option("num-envs", self.num_envs, MANY_ROBOTS)
         check_seed(self.seed)
         check_option("level", self.level, Range(0, LEVELS - 1, whole=True))
-        if self.terrain not in KINDS:
-            raise MuteError(f"--terrain must be one of {', '.join(KINDS)}, got {self.terrain!r}")
+        if self.terrain not in GROUNDS:
+            raise MuteError(f"--terrain must be one of {', '.join(GROUNDS)}, got {self.terrain!r}")
         if self.surface is not None and self.surface not in FLOORS:
             allowed = ", ".join(FLOORS)
             raise MuteError(f"--surface must be one of {allowed}, got {self.surface!r}")

@@ -6,7 +6,6 @@ tells which command, seed, commit and machine made it and what it reaches.
 
 from __future__ import annotations
 
-import os
 import shlex
 import sys
 import tempfile
@@ -25,7 +24,7 @@ from mute.learning.run_directory import read_parameters
 from mute.learning.runner import policy_part
 from mute.learning.saved_state import check_totals
 from mute.support.files import write_file
-from mute.support.provenance import REPOSITORY
+from mute.support.provenance import place_of
 from mute.support.resources import RESOURCES
 from mute.tasks import make_task
 
@@ -65,7 +64,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         figures = _figures(policy_path)
         for path in (policy_path, onnx_path):
             write_file(args.out / path.name, path.read_bytes())
-    figures["policy"] = os.path.relpath(args.out / f"{name}.pt", REPOSITORY)
+    figures["policy"] = place_of(args.out / f"{name}.pt")
     write_json(args.out / f"{name}.json", training | {"figures": figures})
     print(f"written: {args.out / f'{name}.pt'}, {name}.onnx, {name}.json", file=sys.stderr)
     return 0

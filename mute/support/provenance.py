@@ -15,7 +15,7 @@ from mute.support.errors import MuteError
 from mute.support.quiet_git import import_git
 from mute.support.threads import usable_cores
 
-__all__ = ["REPOSITORY", "current_commit", "digest_of", "file_sha256", "machine_kind"]
+__all__ = ["REPOSITORY", "current_commit", "digest_of", "file_sha256", "machine_kind", "place_of"]
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 """Top of the checkout; of an installed package, the directory that it is in."""
@@ -47,6 +47,17 @@ def file_sha256(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
         raise MuteError(f"cannot read {path}: {error.strerror}") from error
+
+
+def place_of(path: Path) -> str:
+    """Return where a file is, for those who have it on another machine.
+
+    From the top of the checkout; of a file elsewhere only the end, as a policy's `TASK/RUN/FILE`.
+    """
+    path = path.resolve()
+    if path.is_relative_to(REPOSITORY):
+        return path.relative_to(REPOSITORY).as_posix()
+    return "/".join(path.parts[1:][-3:])
 
 
 def digest_of(data: Mapping[str, Any]) -> str:

@@ -131,7 +131,13 @@ def test_a_level_is_said_to_be_of_the_floor_walked_on_and_of_the_first_of_severa
     assert re.search(r"level \d\d\.\d dBA \(first robot\)", run.stdout)
 
 
-def test_a_robot_is_put_on_ground_of_the_kind_and_level_that_is_asked_for(policy, monkeypatch):
+@pytest.mark.parametrize(
+    ("kind", "kinds"),
+    [("stairs", {"stairs"}), ("indoor", {"flat", "rooms", "blocks", "stairs_down"})],
+)
+def test_robots_are_put_on_ground_of_the_kind_and_level_that_is_asked_for(
+    kind, kinds, policy, monkeypatch
+):
     grounds: list[Ground] = []
     step = Session.step
 
@@ -140,13 +146,13 @@ def test_a_robot_is_put_on_ground_of_the_kind_and_level_that_is_asked_for(policy
         step(session)
 
     monkeypatch.setattr(Session, "step", noted)
-    words = ("--terrain", "stairs", "--level", "3", "--num-envs", "2", "--seconds", "1", "--json")
+    words = ("--terrain", kind, "--level", "3", "--num-envs", "4", "--seconds", "1", "--json")
     run = _play_here("--policy", str(policy), "--viewer", "none", *words)
     assert run.returncode == 0, run.stderr
     assert set(json.loads(run.stdout)) == REPORTED
     ground = grounds[-1]
     assert isinstance(ground, BoxGround)
-    assert (ground.kinds, ground.level.tolist()) == (("stairs",), [3, 3])
+    assert (set(ground.kinds), ground.level.tolist()) == (kinds, [3, 3, 3, 3])
 
 
 def test_a_surface_adds_its_name_and_levels_above_the_fans_to_the_object(heard):
@@ -186,8 +192,10 @@ def test_a_bad_beta_is_one_line_and_status_2():
         (("--num-envs", "-3"), "--num-envs must be an integer >= 1 .* got -3"),
         (("--seed", "-1"), "--seed must be an integer >= 0 .* got -1"),
         (("--task", "go2"), "--task must be one of go1_mute, .* got 'go2'"),
-        (("--terrain", "moon"), "--terrain must be one of flat, slopes, .* got 'moon'"),
-        (("--terrain", "indoor"), "--terrain must be one of .* got 'indoor'"),
+        (
+            ("--terrain", "moon"),
+            "--terrain must be one of indoor, rough, flat, slopes, .* got 'moon'",
+        ),
         (("--level", "5"), "--level must be an integer >= 0 and <= 4, got 5"),
         (("--surface", "ice"), "--surface must be one of wood, parquet, .* got 'ice'"),
         (("--wav", "walk.mp3"), "--wav must name a .wav file, got 'walk.mp3'"),

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 import yaml
 from learning_helpers import make_runner
-from places import REPOSITORY
 
 from mute.command_lines import evaluate, release
 from mute.evaluation.tables import read_json, write_json
 from mute.support.errors import MuteError
+from mute.support.provenance import place_of
 
 
 @pytest.fixture
@@ -50,7 +49,7 @@ def test_a_release_holds_policy_onnx_and_a_card_of_where_they_come_from(run, tmp
     assert told["resumed"] == ["python train.py --resume model_0.pt"]
     assert (told["seed"], told["iterations"], told["steps"]) == (3, 2, 2 * 8 * 8)
     assert (told["commit"], told["machine"]) == ("c" * 40, "a machine")
-    assert told["figures"] == {"policy": os.path.relpath(out / "go1_mute.pt", REPOSITORY)}
+    assert told["figures"] == {"policy": place_of(out / "go1_mute.pt")}
 
 
 def test_a_release_that_is_interrupted_leaves_the_files_of_the_last_one(run, tmp_path, monkeypatch):

@@ -50,6 +50,13 @@ def test_outside_git_the_commit_is_unknown(tmp_path, monkeypatch):
     assert provenance.current_commit() == "unknown"
 
 
+def test_a_file_is_placed_without_the_folders_of_a_machine(tmp_path):
+    assert provenance.place_of(SHIPPED_POLICY) == "resources/go1/go1_mute.pt"
+    path = tmp_path / "someone" / "runs" / "go1_mute" / "seed0" / "model_9.pt"
+    assert provenance.place_of(path) == "go1_mute/seed0/model_9.pt"
+    assert provenance.place_of(Path("/model_9.pt")) == "model_9.pt"
+
+
 def test_the_origin_of_levels_names_the_policy_the_calibration_the_commit_and_the_machine():
     origin = sound_origin(SHIPPED)
     assert origin["policy"] == "resources/go1/go1_mute.pt"
