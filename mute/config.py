@@ -135,9 +135,11 @@ class AgentCfg:
     """Share of the iterations, the last ones, over which all learning rates fall to zero in a
     straight line: without, the velocity at which a policy walks shifts from one to the next."""
     late_entropy_share: float = 1.0
-    """What is left of the entropy bonus, `ppo.entropy_coef`, after `entropy_ramp`, as a share."""
-    entropy_ramp: tuple[int, int] = (0, 0)
-    """Iterations in which it falls to that share, in a straight line: the first and the last."""
+    """What is left of the entropy bonus, `ppo.entropy_coef`, after `entropy_iterations`, as a
+    share."""
+    entropy_iterations: tuple[int, int] = (0, 0)
+    """Iterations in which it falls to that share, in a straight line: the first and the last,
+    counted from the training's beginning. (0, 0) where it does not fall."""
     save_interval: int = 50
     """Iterations between checkpoints."""
     noise_interval: int = 20
@@ -183,7 +185,7 @@ class AgentCfg:
             "num_steps_per_env": Range(1, 10000, whole=True),
             "settling_share": _SHARE,
             "late_entropy_share": _SHARE,
-            "entropy_ramp": Range(0, 10**9, whole=True),
+            "entropy_iterations": Range(0, 10**9, whole=True),
             "save_interval": _COUNT,
             "noise_interval": Range(0, 10**9, whole=True),
             "actor_hidden": _WIDTH,
@@ -199,7 +201,12 @@ class AgentCfg:
             self._check_even_widths()
         elif self.leading_side:
             raise ValueError("agent.leading_side must be false unless agent.symmetric, got true")
-        check_ordered(self, "agent", "entropy_ramp", "std_range")
+        check_ordered(self, "agent", "entropy_iterations", "std_range")
+        if (self.late_entropy_share < 1.0) != (self.entropy_iterations[1] > 0):
+            raise ValueError(
+                "agent.entropy_iterations and agent.late_entropy_share go together, got "
+                f"{self.entropy_iterations} and {self.late_entropy_share:g}"
+            )
 
     def _check_even_widths(self) -> None:
         network = self.estimation.network

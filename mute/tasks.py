@@ -91,7 +91,7 @@ def _go1_mute_indoor() -> TaskCfg:
         # Steps are found with much exploration; then, as levels keep robots at the end of what
         # they can, it would grow, and robots would follow commands ever worse.
         late_entropy_share=0.3,
-        entropy_ramp=(650, 750),
+        entropy_iterations=(650, 750),
         # The last learning rates fall over as many iterations as on flat ground.
         settling_share=0.075,
     )

@@ -40,7 +40,8 @@ class Kind(ABC):
         """Return the height of the ground, m; at the middle of where robots begin it is 0.
 
         Args:
-            xy: Points in the world frame, m. Shape: (n, points, 2).
+            xy: Points in the world frame, m, finite; those of a robot within few metres, as all
+                that lies between them may be looked up. Shape: (n, points, 2), n > 0.
             level: Of each robot.
             key: Of each robot.
 

@@ -111,8 +111,8 @@ class PlayArgs(DriverArgs):
     direction, as in training."""
     terrain: str = "flat"
     """Ground to walk on: flat, slopes, uneven, blocks, stairs, stairs_down or rooms; indoor or
-    rough, with several robots, each on one of these. Except on flat ground, pictures have dots:
-    green where it is, orange where the policy takes it to be."""
+    rough, for several robots, is a mix of these. Except on flat ground, pictures have dots: green
+    where it is, orange where the policy takes it to be."""
     level: int = 2
     """How difficult it is, 0 to 4."""
     surface: str | None = None
@@ -158,6 +158,12 @@ class PlayArgs(DriverArgs):
         check_option("level", self.level, Range(0, LEVELS - 1, whole=True))
         if self.terrain not in GROUNDS:
             raise MuteError(f"--terrain must be one of {', '.join(GROUNDS)}, got {self.terrain!r}")
+        if len(GROUNDS[self.terrain]) > self.num_envs:
+            kinds = ", ".join(GROUNDS[self.terrain])
+            raise MuteError(
+                f"--terrain {self.terrain} is {kinds}, so it takes as many robots at least: "
+                f"--num-envs {len(GROUNDS[self.terrain])}, got {self.num_envs}"
+            )
         if self.surface is not None and self.surface not in FLOORS:
             allowed = ", ".join(FLOORS)
             raise MuteError(f"--surface must be one of {allowed}, got {self.surface!r}")

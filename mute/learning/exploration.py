@@ -22,16 +22,16 @@ class Exploration:
     """Weight of the entropy bonus at first."""
     late_share: float
     """What is left of it in the end, as a share."""
-    ramp: tuple[int, int]
+    iterations: tuple[int, int]
     """Iterations in which it falls, the first and the last."""
 
     @classmethod
     def of(cls, cfg: AgentCfg) -> Exploration:
         """Return that of a configuration."""
-        return cls(cfg.ppo.entropy_coef, cfg.late_entropy_share, cfg.entropy_ramp)
+        return cls(cfg.ppo.entropy_coef, cfg.late_entropy_share, cfg.entropy_iterations)
 
     def weight(self, iteration: int) -> float:
         """Return the weight of the entropy bonus in an iteration: it falls in a straight line."""
-        start, end = self.ramp
+        start, end = self.iterations
         fallen = min(1.0, max(0.0, (iteration - start + 1) / (end - start + 1)))
         return self.entropy_coef * (1.0 - fallen * (1.0 - self.late_share))

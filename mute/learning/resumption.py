@@ -58,7 +58,7 @@ RULES: dict[str, Rule] = {
     "agent.num_steps_per_env": "applied",
     "agent.settling_share": "applied",
     "agent.late_entropy_share": "applied",
-    "agent.entropy_ramp": "applied",
+    "agent.entropy_iterations": "applied",
     "agent.save_interval": "applied",
     "agent.noise_interval": "applied",
     "agent.actor_hidden": "kept",

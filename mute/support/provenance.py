@@ -52,12 +52,13 @@ def file_sha256(path: Path) -> str:
 def place_of(path: Path) -> str:
     """Return where a file is, for those who have it on another machine.
 
-    From the top of the checkout; of a file elsewhere only the end, as a policy's `TASK/RUN/FILE`.
+    From the top of the checkout; elsewhere `TASK/RUN/FILE` if it is of a run, or its name alone.
     """
     path = path.resolve()
     if path.is_relative_to(REPOSITORY):
         return path.relative_to(REPOSITORY).as_posix()
-    return "/".join(path.parts[1:][-3:])
+    of_a_run = (path.parent / "config.yaml").is_file()
+    return "/".join(path.parts[-3:]) if of_a_run else path.name
 
 
 def digest_of(data: Mapping[str, Any]) -> str:

@@ -147,7 +147,7 @@ def test_the_page_tells_the_figures_of_the_recipe_indoors():
     assert env.engine == "mujoco" and "MuJoCo's own physics on every device" in told
     bonus = cfg.agent.ppo.entropy_coef
     falls = f"falls from {bonus:g} to {bonus * cfg.agent.late_entropy_share:g}"
-    first, last = cfg.agent.entropy_ramp
+    first, last = cfg.agent.entropy_iterations
     assert f"The entropy bonus {falls} from iteration {first} to {last}." in told
     settling = f"{100.0 * cfg.agent.settling_share:g} % of {cfg.agent.iterations} iterations"
     assert f"fall over the last {settling}, which are as many as on flat ground" in told

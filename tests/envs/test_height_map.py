@@ -30,6 +30,20 @@ def test_the_default_grid_spans_90_by_60_centimetres_around_the_trunk():
     torch.testing.assert_close(grid.amin(dim=0), torch.tensor([-0.45, -0.30]))
 
 
+def test_a_robots_map_is_that_of_the_robot_alone_and_exact_where_products_are_not():
+    grid, generator = HeightMapCfg().grid(), torch.Generator().manual_seed(0)
+    base_pos = torch.randn(200, 3, generator=generator)
+    heading = _heading(*(6.0 * torch.rand(200, generator=generator)).tolist())
+    before = torch.get_float32_matmul_precision()
+    torch.set_float32_matmul_precision("medium")  # as in a training
+    try:
+        heights = _Slope().height_map(grid, base_pos, heading)
+        alone = _Slope().height_map(grid, base_pos[7:8], heading[7:8])
+    finally:
+        torch.set_float32_matmul_precision(before)
+    assert torch.equal(heights[7:8], alone)
+
+
 def test_the_grid_runs_across_first_and_then_along():
     grid = HeightMapCfg(length=0.4, width=0.8, spacing=0.2).grid()
     expected = [[x, y] for x in (-0.2, 0.0, 0.2) for y in (-0.4, -0.2, 0.0, 0.2, 0.4)]

@@ -71,7 +71,7 @@ def test_the_recipe_indoors_is_the_flat_one_over_ground():
     assert indoor.env.commands == flat.env.commands
     robots = {"floor_stiffness": flat.env.randomization.floor_stiffness}
     assert dataclasses.replace(indoor.env.randomization, **robots) == flat.env.randomization
-    other = ("iterations", "settling_share", "late_entropy_share", "entropy_ramp")
+    other = ("iterations", "settling_share", "late_entropy_share", "entropy_iterations")
     agent = {name: getattr(flat.agent, name) for name in other}
     assert dataclasses.replace(indoor.agent, **agent) == flat.agent
 
@@ -90,7 +90,7 @@ def test_the_recipe_indoors_has_the_figures_that_ground_takes():
     ground = env.terrain
     assert (ground.first_levels, ground.crossed, ground.curriculum) == ((0, 0), 3.0, True)
     assert (ground.command_time, ground.turning_share) == (5.0, 0.2)
-    first, last = indoor.agent.entropy_ramp  # after steps are found, as quiet grows in
+    first, last = indoor.agent.entropy_iterations  # after steps are found, as quiet grows in
     grows = env.rewards.quiet_ramp[0] / (indoor.agent.num_steps_per_env * env.step_dt)
     assert first < last and first == pytest.approx(grows, rel=0.1)
     falling = [task.agent.settling_share * task.agent.iterations for task in (flat, indoor)]

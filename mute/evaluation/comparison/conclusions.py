@@ -153,10 +153,10 @@ def falls_often(row: Row) -> bool:
 
 def equal_speed_level(rows: Sequence[Row], name: str, surface: str) -> float:
     """Return the mean level of a label at an actual speed of `EQUAL_SPEED`, dBA; NaN if not met."""
-    by_training: dict[str, list[tuple[float, float]]] = {}
+    by_training: dict[tuple[str, int | None], list[tuple[float, float]]] = {}
     for row in _of(rows, name, surface):
         if row["mnl_mean"] is not None and row["speed_mean"] is not None:
-            walks = by_training.setdefault(row["policy"], [])
+            walks = by_training.setdefault((row["policy"], row["training_seed"]), [])
             walks.append((row["speed_mean"], row["mnl_mean"]))
     met = [level_at_speed(walks, EQUAL_SPEED) for walks in by_training.values()]
     return statistics.fmean(met) if met else math.nan

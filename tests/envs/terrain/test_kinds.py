@@ -195,6 +195,19 @@ def test_ground_follows_from_its_key_and_nothing_else(name):
     assert not torch.equal(one, other)
 
 
+@pytest.mark.parametrize("middle", [0.0, -7.3, 1000.0])
+@pytest.mark.parametrize("name", _AWAY)
+def test_each_of_many_points_has_the_height_that_it_has_alone(name, middle):
+    # What is looked up at once is the more the further a robot's points lie apart.
+    ground, _ = _ground(name, 4)
+    ground.level = torch.tensor([1, 4, 4, 2])
+    generator = torch.Generator().manual_seed(2)
+    apart = torch.tensor([0.1, 1.0, 3.0, 0.0])[:, None, None]
+    points = middle + apart * (torch.rand(4, 50, 2, generator=generator) - 0.5)
+    alone = torch.cat([ground.height(points[:, [k]]) for k in range(50)], dim=1)
+    assert torch.equal(ground.height(points), alone)
+
+
 def test_rooms_have_cables_sills_carpets_steps_and_stairs():
     ground, _ = _ground("rooms", 1)
     ground.level[:] = 4

@@ -28,7 +28,7 @@ from mute.config import AgentCfg, EstimationCfg, TaskCfg, to_plain
 from mute.controllers.command import Command
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
-from mute.envs.terrain import BoxGround, Ground
+from mute.envs.terrain import GROUNDS, BoxGround, Ground
 from mute.evaluation.session import Session
 from mute.evaluation.trials import evaluation_cfg
 from mute.learning.runner import MuteRunner, policy_part
@@ -133,7 +133,7 @@ def test_a_level_is_said_to_be_of_the_floor_walked_on_and_of_the_first_of_severa
 
 @pytest.mark.parametrize(
     ("kind", "kinds"),
-    [("stairs", {"stairs"}), ("indoor", {"flat", "rooms", "blocks", "stairs_down"})],
+    [("stairs", {"stairs"}), ("indoor", set(GROUNDS["indoor"]))],
 )
 def test_robots_are_put_on_ground_of_the_kind_and_level_that_is_asked_for(
     kind, kinds, policy, monkeypatch
@@ -146,13 +146,13 @@ def test_robots_are_put_on_ground_of_the_kind_and_level_that_is_asked_for(
         step(session)
 
     monkeypatch.setattr(Session, "step", noted)
-    words = ("--terrain", kind, "--level", "3", "--num-envs", "4", "--seconds", "1", "--json")
+    words = ("--terrain", kind, "--level", "3", "--num-envs", "5", "--seconds", "1", "--json")
     run = _play_here("--policy", str(policy), "--viewer", "none", *words)
     assert run.returncode == 0, run.stderr
     assert set(json.loads(run.stdout)) == REPORTED
     ground = grounds[-1]
     assert isinstance(ground, BoxGround)
-    assert (set(ground.kinds), ground.level.tolist()) == (kinds, [3, 3, 3, 3])
+    assert (set(ground.kinds), ground.level.tolist()) == (kinds, [3, 3, 3, 3, 3])
 
 
 def test_a_surface_adds_its_name_and_levels_above_the_fans_to_the_object(heard):
@@ -196,6 +196,7 @@ def test_a_bad_beta_is_one_line_and_status_2():
             ("--terrain", "moon"),
             "--terrain must be one of indoor, rough, flat, slopes, .* got 'moon'",
         ),
+        (("--terrain", "indoor"), "--terrain indoor is flat, rooms, .* --num-envs 5, got 1"),
         (("--level", "5"), "--level must be an integer >= 0 and <= 4, got 5"),
         (("--surface", "ice"), "--surface must be one of wood, parquet, .* got 'ice'"),
         (("--wav", "walk.mp3"), "--wav must name a .wav file, got 'walk.mp3'"),

@@ -11,7 +11,6 @@ from learning_helpers import make_runner
 from mute.command_lines import evaluate, release
 from mute.evaluation.tables import read_json, write_json
 from mute.support.errors import MuteError
-from mute.support.provenance import place_of
 
 
 @pytest.fixture
@@ -49,7 +48,7 @@ def test_a_release_holds_policy_onnx_and_a_card_of_where_they_come_from(run, tmp
     assert told["resumed"] == ["python train.py --resume model_0.pt"]
     assert (told["seed"], told["iterations"], told["steps"]) == (3, 2, 2 * 8 * 8)
     assert (told["commit"], told["machine"]) == ("c" * 40, "a machine")
-    assert told["figures"] == {"policy": place_of(out / "go1_mute.pt")}
+    assert told["figures"] == {"policy": "go1_mute.pt"}
 
 
 def test_a_release_that_is_interrupted_leaves_the_files_of_the_last_one(run, tmp_path, monkeypatch):

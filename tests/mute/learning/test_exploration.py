@@ -15,21 +15,20 @@ from mute.learning.runner import MuteRunner
 def _cfg(iterations: int) -> TaskCfg:
     cfg = make_cfg(iterations)
     ppo = dataclasses.replace(cfg.agent.ppo, entropy_coef=0.01)
-    fading = {"late_entropy_share": 0.2, "entropy_ramp": (1, 2)}
+    fading = {"late_entropy_share": 0.2, "entropy_iterations": (1, 2)}
     return dataclasses.replace(cfg, agent=dataclasses.replace(cfg.agent, ppo=ppo, **fading))
 
 
 @pytest.mark.parametrize(
     ("ramp", "weights"),
     [
-        ((0, 0), [0.2, 0.2, 0.2, 0.2]),
         ((2, 2), [1.0, 1.0, 0.2, 0.2]),
         ((1, 2), [1.0, 0.6, 0.2, 0.2]),
         ((0, 3), [0.8, 0.6, 0.4, 0.2]),
     ],
 )
 def test_it_falls_in_a_straight_line_from_the_first_to_the_last_iteration(ramp, weights):
-    exploration = Exploration(entropy_coef=1.0, late_share=0.2, ramp=ramp)
+    exploration = Exploration(entropy_coef=1.0, late_share=0.2, iterations=ramp)
     assert [exploration.weight(iteration) for iteration in range(4)] == pytest.approx(weights)
 
 
@@ -67,7 +66,9 @@ def test_each_update_has_the_weight_of_its_iteration_and_a_resumed_one_as_well(t
 @pytest.mark.parametrize(
     ("changed", "told"),
     [
-        ({"entropy_ramp": (5, 2)}, r"agent\.entropy_ramp must be \(low, high\)"),
+        ({"entropy_iterations": (5, 2)}, r"agent\.entropy_iterations must be \(low, high\)"),
+        ({"entropy_iterations": (2, 5)}, r"go together, got \(2, 5\) and 1"),
+        ({"late_entropy_share": 0.5}, r"go together, got \(0, 0\) and 0\.5"),
         ({"late_entropy_share": 1.5}, r"agent\.late_entropy_share must be"),
     ],
 )

@@ -53,6 +53,9 @@ def test_outside_git_the_commit_is_unknown(tmp_path, monkeypatch):
 def test_a_file_is_placed_without_the_folders_of_a_machine(tmp_path):
     assert provenance.place_of(SHIPPED_POLICY) == "resources/go1/go1_mute.pt"
     path = tmp_path / "someone" / "runs" / "go1_mute" / "seed0" / "model_9.pt"
+    assert provenance.place_of(path) == "model_9.pt"
+    path.parent.mkdir(parents=True)
+    (path.parent / "config.yaml").write_text("")
     assert provenance.place_of(path) == "go1_mute/seed0/model_9.pt"
     assert provenance.place_of(Path("/model_9.pt")) == "model_9.pt"
 

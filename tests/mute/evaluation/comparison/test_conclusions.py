@@ -52,6 +52,8 @@ def test_equal_speed_lies_between_what_came_out_of_each_training():
         make_row("MPC", 90.0, command=0.8, speed_mean=0.8, policy="b.pt"),
     ]
     assert equal_speed_level(rows, "MPC", "wood") == pytest.approx((62.0 + 70.0) / 2)
+    namesakes = [row | {"policy": "m.pt", "training_seed": i // 2} for i, row in enumerate(rows)]
+    assert equal_speed_level(namesakes, "MPC", "wood") == pytest.approx((62.0 + 70.0) / 2)
     assert math.isnan(equal_speed_level(rows[:1], "MPC", "wood"))
     assert math.isnan(equal_speed_level(rows, "MPC", "tile"))
 
