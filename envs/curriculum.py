@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from .quadruped_env_cfg import QuadrupedEnvCfg
 
-__all__ = ["Curriculum", "curriculum"]
+__all__ = ["Curriculum", "curriculum", "ramp"]
 
 
 class Curriculum(NamedTuple):
@@ -31,14 +31,20 @@ def curriculum(cfg: QuadrupedEnvCfg, step_count: int) -> Curriculum:
     """
     elapsed = step_count * cfg.step_dt
     return Curriculum(
-        quiet=_ramp(elapsed, cfg.rewards.quiet_ramp),
-        lift=_ramp(elapsed, cfg.rewards.lift_ramp),
-        guide=1.0 - _ramp(elapsed, cfg.rewards.guide_ramp),
-        commands=_ramp(elapsed, cfg.commands.ramp),
+        quiet=ramp(elapsed, cfg.rewards.quiet_ramp),
+        lift=ramp(elapsed, cfg.rewards.lift_ramp),
+        guide=1.0 - ramp(elapsed, cfg.rewards.guide_ramp),
+        commands=ramp(elapsed, cfg.commands.ramp),
     )
 
 
-def _ramp(elapsed: float, bounds: tuple[float, float]) -> float:
+def ramp(elapsed: float, bounds: tuple[float, float]) -> float:
+    """Return the share, in [0, 1], of a rise in a straight line that has passed.
+
+    Args:
+        elapsed: How far it is.
+        bounds: Where the rise begins and where it is over; where they are one, at once.
+    """
     start, end = bounds
     if elapsed >= end:
         return 1.0

@@ -290,7 +290,7 @@ class Rooms(Kind):
     wide_boxes = 24
     max_heading = 0.25 * pi
     _CELL = 2.4
-    _STEPS = 3
+    STEPS = 3
     """Steps of stairs, and so boxes of a cell."""
 
     def height(self, xy: torch.Tensor, level: torch.Tensor, key: torch.Tensor) -> torch.Tensor:
@@ -298,12 +298,9 @@ class Rooms(Kind):
         place = xy[..., 0] / self._CELL
         cell = torch.round(place)
         # The few cells that a robot's points are in are looked up once for all of them.
-        first = cell.amin(dim=1, keepdim=True)
-        cells = torch.arange(int((cell - first).max()) + 1, device=xy.device)
-        which = (cell - first).long()
-        half, steps, rise = (
-            part.gather(1, which) for part in self._thing(first.long() + cells, level, key)
-        )
+        cells, which = _run(cell)
+        which = which.long()
+        half, steps, rise = (part.gather(1, which) for part in self._thing(cells, level, key))
         away = (place - cell).abs() * self._CELL
         covering = torch.floor((half - away) / TREAD + 1.0).clamp(min=0.0)
         return rise * torch.minimum(covering, steps)
@@ -315,12 +312,12 @@ class Rooms(Kind):
         first = torch.floor(xy[:, :1] / self._CELL).long()
         cell = first + torch.arange(-3 if wide else 0, 5 if wide else 2, device=xy.device)
         half, steps, rise = self._thing(cell, level, key)
-        step = torch.arange(self._STEPS, device=xy.device).repeat_interleave(cell.shape[1])
-        half, steps, rise = (part.repeat(1, self._STEPS) for part in (half, steps, rise))
+        step = torch.arange(self.STEPS, device=xy.device).repeat_interleave(cell.shape[1])
+        half, steps, rise = (part.repeat(1, self.STEPS) for part in (half, steps, rise))
         there = step < steps
         half = torch.where(there, half - TREAD * step, 0.0)
         top = torch.where(there, rise * (step + 1.0), 0.0)
-        middle = (cell * self._CELL).repeat(1, self._STEPS)
+        middle = (cell * self._CELL).repeat(1, self.STEPS)
         base = self.base(level)[:, None]
         return boxes((middle - half, middle + half), _beside(xy, top.shape[1], wide), top, base)
 
@@ -371,8 +368,8 @@ def _draw_rooms() -> tuple[torch.Tensor, torch.Tensor]:
         rise = torch.where(here, heights, rise)
         share += its_share
     stairs = which >= share
-    half = torch.where(stairs, 0.3 + 2 * TREAD, half)
-    steps = torch.where(stairs, 3.0, steps)
+    half = torch.where(stairs, 0.3 + (Rooms.STEPS - 1) * TREAD, half)
+    steps = torch.where(stairs, float(Rooms.STEPS), steps)
     rise = torch.where(stairs, torch.tensor(FIGURES["riser"])[:, None], rise)
     return torch.stack((half, steps)), rise
 
@@ -430,10 +427,22 @@ def _cells(cell: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor
         The indices of the cells of a rectangle around the points, each of shape (n, cells), and
         which of these each point is in, of shape (n, points).
     """
-    x, y = cell.unbind(dim=-1)
-    first_x, first_y = x.amin(dim=1, keepdim=True), y.amin(dim=1, keepdim=True)
-    x, y = x - first_x, y - first_y
-    row = int(y.max()) + 1
-    cells = torch.arange((int(x.max()) + 1) * row, device=cell.device)
-    i, j = first_x.long() + cells // row, first_y.long() + cells % row
-    return i, j, (x * row + y).long()
+    (i, along), (j, across) = (_run(part) for part in cell.unbind(dim=-1))
+    rows, row = i.shape[1], j.shape[1]
+    return i.repeat_interleave(row, dim=1), j.repeat(1, rows), (along * row + across).long()
+
+
+def _run(cell: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Return the cells from the first to the last that a robot's points are in, along one axis.
+
+    Args:
+        cell: The index of the cell of each point, whole numbers. Shape: (n, points).
+
+    Returns:
+        The indices of the cells, int64, of shape (n, cells), and which of these each point is in,
+        whole numbers of the type of `cell`, of its shape.
+    """
+    first = cell.amin(dim=1, keepdim=True)
+    which = cell - first
+    cells = torch.arange(int(which.max()) + 1, device=cell.device)
+    return first.long() + cells, which

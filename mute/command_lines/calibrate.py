@@ -119,7 +119,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def provenance(args: CalibrationArgs, policy: Driver) -> dict[str, Any]:
-    """Return where a calibration comes from, as plain data; paths are the repository's."""
+    """Return where a calibration comes from, as plain data; files are named by `place_of`."""
     options = {
         "policy": place_of(args.policy),
         "reference": args.reference,

@@ -11,6 +11,7 @@ from typing import Any
 
 import torch
 
+from mute.acoustics.origin import policy_origin
 from mute.command_lines.arguments import (
     LONGEST_WALK,
     MANY_ROBOTS,
@@ -35,7 +36,7 @@ from mute.evaluation.endurance import HARDSHIPS, LONGEST_PUSHES, be_pushed, bear
 from mute.evaluation.tables import print_table, write_csv, write_json
 from mute.evaluation.terrain_targets import terrain_targets
 from mute.support.plain_data import without_nan
-from mute.support.provenance import current_commit, file_sha256, machine_kind, place_of
+from mute.support.provenance import current_commit, machine_kind
 from mute.support.ranges import Range
 from mute.support.signals import exit_status
 
@@ -135,8 +136,7 @@ def terrain(args: TerrainArgs) -> int:
         status = exit_status(stop)
     if tables:
         about = {
-            "policy": place_of(args.policy),
-            "policy_sha256": file_sha256(args.policy),
+            **policy_origin(args.policy),
             "trained_seed": policy.cfg.env.seed,
             "iteration": policy.iteration,
             "commit": current_commit(),

@@ -158,11 +158,11 @@ class PlayArgs(DriverArgs):
         check_option("level", self.level, Range(0, LEVELS - 1, whole=True))
         if self.terrain not in GROUNDS:
             raise MuteError(f"--terrain must be one of {', '.join(GROUNDS)}, got {self.terrain!r}")
-        if len(GROUNDS[self.terrain]) > self.num_envs:
-            kinds = ", ".join(GROUNDS[self.terrain])
+        kinds = GROUNDS[self.terrain]
+        if len(kinds) > self.num_envs:
             raise MuteError(
-                f"--terrain {self.terrain} is {kinds}, so it takes as many robots at least: "
-                f"--num-envs {len(GROUNDS[self.terrain])}, got {self.num_envs}"
+                f"--terrain {self.terrain} is {', '.join(kinds)}, so it takes as many robots at "
+                f"least: --num-envs {len(kinds)}, got {self.num_envs}"
             )
         if self.surface is not None and self.surface not in FLOORS:
             allowed = ", ".join(FLOORS)

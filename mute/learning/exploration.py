@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mute.config import AgentCfg
+from mute.envs.curriculum import ramp
 
 __all__ = ["Exploration"]
 
@@ -32,6 +33,6 @@ class Exploration:
 
     def weight(self, iteration: int) -> float:
         """Return the weight of the entropy bonus in an iteration: it falls in a straight line."""
-        start, end = self.iterations
-        fallen = min(1.0, max(0.0, (iteration - start + 1) / (end - start + 1)))
+        first, last = self.iterations
+        fallen = ramp(iteration + 1, (first, last + 1))
         return self.entropy_coef * (1.0 - fallen * (1.0 - self.late_share))
