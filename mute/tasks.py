@@ -21,7 +21,6 @@ from mute.support.errors import MuteError
 __all__ = [
     "DEFAULT_TASK",
     "FLAT_TASK",
-    "INDOOR_TASK",
     "PAPERS_PHASE_TERMS",
     "QUIET_TERM_TASKS",
     "make_task",
@@ -30,14 +29,11 @@ __all__ = [
 ]
 
 DEFAULT_TASK = "go1_mute"
+"""The recipe over the floors and stairs of a house, of hours."""
 
 FLAT_TASK = "go1_mute_flat"
 """The recipe on flat ground, of minutes: by it parts and quiet terms are compared, and its robots
 are those of whatever drives without a task of its own."""
-
-INDOOR_TASK = "go1_mute_indoor"
-"""The recipe over the floors and stairs of a house, of hours. It is to be the default once a policy
-that it has trained ships; until then that is the flat one."""
 
 PAPERS_PHASE_TERMS = tuple(name for name, term in paper_terms().items() if term.group == "phase")
 """Names of what the paper is quiet by."""
@@ -61,7 +57,7 @@ def _go1_mute_flat() -> TaskCfg:
     return _led_to_a_trot(_quiet())
 
 
-def _go1_mute_indoor() -> TaskCfg:
+def _go1_mute() -> TaskCfg:
     """Return the recipe of flat ground, over the floors and stairs of a house.
 
     Physics is MuJoCo's own on every device: Warp has flat ground alone.
@@ -87,13 +83,13 @@ def _go1_mute_indoor() -> TaskCfg:
     )
     agent = dataclasses.replace(
         task.agent,
-        iterations=3000,
+        iterations=2400,
         # Steps are found with much exploration; then, as levels keep robots at the end of what
         # they can, it would grow, and robots would follow commands ever worse.
         late_entropy_share=0.3,
         entropy_iterations=(650, 750),
         # The last learning rates fall over as many iterations as on flat ground.
-        settling_share=0.075,
+        settling_share=0.094,
     )
     return TaskCfg(env=env, agent=agent)
 
@@ -286,9 +282,8 @@ QUIET_TERM_TASKS = tuple(_QUIET_TERM_TASKS)
 """Names of the tasks of `go1_mute_flat`'s recipe with quiet terms of the literature."""
 
 _TASKS: dict[str, Callable[[], TaskCfg]] = {
-    DEFAULT_TASK: _go1_mute_flat,
+    DEFAULT_TASK: _go1_mute,
     FLAT_TASK: _go1_mute_flat,
-    INDOOR_TASK: _go1_mute_indoor,
     "go1_mute_paper": _go1_mute_paper,
     "go1_dreamwaq": _go1_dreamwaq,
     **_QUIET_TERM_TASKS,

@@ -229,7 +229,7 @@ def _arguments(argv: Sequence[str]) -> tuple[TrainArgs, Path | None]:
     cfg = make_task(task)
     args = _parse(argv, task, cfg)
     if args.resume is None:
-        if task in (DEFAULT_TASK, FLAT_TASK) and resolve_device(args.device) == "cuda":
+        if task == FLAT_TASK and resolve_device(args.device) == "cuda":
             cfg = dataclasses.replace(cfg, env=dataclasses.replace(cfg.env, num_envs=_GPU_ENVS))
             args = _parse(argv, task, cfg)
         return args, None
