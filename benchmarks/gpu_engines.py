@@ -1,6 +1,6 @@
 """Hold MuJoCo Warp on a device to MuJoCo on the CPU: python -m benchmarks.gpu_engines.
 
-Robots walk with the policy that ships, in the engine of the CPU. From the same state, with the same
+Robots walk with the policy of flat ground, in the engine of the CPU. From the same state, with the same
 randomised physics, Warp follows the same set points, and positions, velocities and the downward
 speed of the feet at every physics step are compared. A foot whose distance to the ground is within
 rounding of zero touches it a physics step earlier in one of them, and from there on the two robots
@@ -30,7 +30,7 @@ from mute.support.errors import run_cli
 from mute.support.plain_data import without_nan
 from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
-from mute.tasks import DEFAULT_TASK
+from mute.tasks import FLAT_TASK
 
 from .gpu_memory import peak_of_this_process
 
@@ -80,7 +80,7 @@ def compare(device: str, num_envs: int, steps: int) -> dict[str, object]:
         num_envs: Robots.
         steps: Control steps.
     """
-    policy = load_policy(RESOURCES / "go1" / f"{DEFAULT_TASK}.pt")
+    policy = load_policy(RESOURCES / "go1" / f"{FLAT_TASK}.pt")
     cfg = evaluation_cfg(policy.cfg.env, num_envs, 30.0, seed=3, randomized=True)
     env = QuadrupedEnv(cfg)
     command = torch.zeros(num_envs, 4)

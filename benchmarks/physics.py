@@ -1,6 +1,6 @@
 """Measure what parts of the physics cost, and what they are worth: python -m benchmarks.physics.
 
-The policy that ships walks with the exploration of a training, robots differing as in a training.
+The policy of flat ground walks with the exploration of a training, robots differing as in a training.
 Their actions of a rollout are then done again, from the same state, by the bare engine with one
 thing changed at a time. All variants take turns in one process, in an order drawn anew for each
 turn, and are compared with the scene as it is within the turn.
@@ -48,7 +48,7 @@ from mute.support.provenance import machine_kind
 from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
 from mute.support.threads import core_share, use_collection_threads
-from mute.tasks import DEFAULT_TASK
+from mute.tasks import FLAT_TASK
 
 __all__ = ["VARIANTS", "PhysicsBenchmarkArgs", "Variant"]
 
@@ -156,7 +156,7 @@ VARIANTS = (
 class PhysicsBenchmarkArgs:
     """Arguments of the benchmark."""
 
-    policy: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
+    policy: Path = RESOURCES / "go1" / f"{FLAT_TASK}.pt"
     """The policy that walks."""
     num_envs: int = 1024
     """Robots that are stepped."""

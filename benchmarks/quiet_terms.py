@@ -26,7 +26,7 @@ from mute.support.errors import run_cli
 from mute.support.provenance import current_commit, machine_kind
 from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
-from mute.tasks import DEFAULT_TASK, QUIET_TERM_TASKS, make_task
+from mute.tasks import FLAT_TASK, QUIET_TERM_TASKS, make_task
 
 __all__ = ["QuietTermsArgs", "costs", "main"]
 
@@ -38,7 +38,7 @@ _SPEED = 0.5
 class QuietTermsArgs:
     """Arguments of the measurement."""
 
-    policy: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
+    policy: Path = RESOURCES / "go1" / f"{FLAT_TASK}.pt"
     """Whose landings are measured, at beta 0."""
     robots: int = 48
     """Number of robots."""

@@ -268,7 +268,7 @@ def _upright() -> dict[str, RewardTermCfg]:
 
 
 # Weights are ours: each makes a landing at 0.5 m/s cost 5 for each unit of beta on a walk of the
-# policy that ships, by `benchmarks.quiet_terms`.
+# policy of `go1_mute_flat`, by `benchmarks.quiet_terms`.
 _QUIET_TERM_TASKS: dict[str, Callable[[], TaskCfg]] = {
     "go1_quiet_phase": _quiet_by(
         reward_term("foot_drop_velocity", -4.8), reward_term("foot_raise_velocity", 0.96)

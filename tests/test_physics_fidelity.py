@@ -1,6 +1,6 @@
 """The physics that trains, and the one that is heard, against steps of 0.5 ms.
 
-The policy that ships walks in all of them; its landing speeds, contact forces and work must agree.
+The policy of flat ground walks in all of them; its landing speeds, contact forces and work must agree.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 
 import pytest
-from places import SHIPPED_POLICY
+from places import FLAT_POLICY
 
 from mute.controllers import load_policy
 from mute.evaluation.physics_fidelity import REFERENCE, walk_figures
@@ -22,7 +22,7 @@ large; all else agrees within 2 %."""
 
 
 def _walk(timestep: float, beta: float) -> dict[str, float]:
-    policy = load_policy(SHIPPED_POLICY)
+    policy = load_policy(FLAT_POLICY)
     cfg = evaluation_cfg(policy.cfg.env, ROBOTS, SECONDS, seed=1)
     scene = dataclasses.replace(cfg.scene, timestep=timestep)
     decimation = round(cfg.step_dt / timestep)

@@ -27,7 +27,7 @@ def physics_section(measured: Mapping[str, Any]) -> str:
         "## What the physics costs\n\n"
         f"`python -m benchmarks.physics{measured['options']} --out docs/physics.json`: "
         f"{measured['num_envs']:,} "
-        "randomised robots of the policy that ships, with exploration; the bare engine does their "
+        "randomised robots of `go1_mute_flat`'s policy, with exploration; the bare engine does their "
         "rollout again with one thing changed at a time, all in turns in one process "
         f"({measured['turns']} turns, {measured['machine']}, MuJoCo {measured['mujoco']}). Speed "
         "is that of control steps over the scene as it is, with its 95 % interval. The other "

@@ -11,7 +11,7 @@ from places import REPOSITORY
 from mute.envs.commands import CommandSampler
 from mute.envs.rewards import paper_terms
 from mute.evaluation.trials import evaluation_cfg
-from mute.tasks import FLAT_TASK, INDOOR_TASK, make_task
+from mute.tasks import DEFAULT_TASK, FLAT_TASK, make_task
 
 _PAGE = " ".join((REPOSITORY / "docs" / "method.md").read_text().split())
 _CFG = make_task(FLAT_TASK)
@@ -128,7 +128,7 @@ def _told_of(task: str) -> str:
 
 
 def test_the_page_tells_the_figures_of_the_recipe_indoors():
-    cfg, told = make_task(INDOOR_TASK), _told_of(INDOOR_TASK)
+    cfg, told = make_task(DEFAULT_TASK), _told_of(DEFAULT_TASK)
     env, ground = cfg.env, cfg.env.terrain
     lowest, highest = ground.first_levels
     assert lowest == highest
@@ -156,6 +156,6 @@ def test_the_page_tells_the_figures_of_the_recipe_indoors():
 
 
 def test_whatever_measures_the_recipe_indoors_has_the_physics_steps_that_the_page_tells():
-    measured = evaluation_cfg(make_task(INDOOR_TASK).env, num_envs=1, seconds=1.0, seed=0)
+    measured = evaluation_cfg(make_task(DEFAULT_TASK).env, num_envs=1, seconds=1.0, seed=0)
     steps = f"{1000.0 * measured.scene.timestep:g} ms"
-    assert f"Whatever measures the policy has steps of {steps}." in _told_of(INDOOR_TASK)
+    assert f"Whatever measures the policy has steps of {steps}." in _told_of(DEFAULT_TASK)

@@ -7,3 +7,4 @@ from pathlib import Path
 REPOSITORY = Path(__file__).resolve().parents[2]
 RESOURCES = REPOSITORY / "resources"
 SHIPPED_POLICY = RESOURCES / "go1" / "go1_mute.pt"
+FLAT_POLICY = RESOURCES / "go1" / "go1_mute_flat.pt"

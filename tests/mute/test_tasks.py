@@ -12,7 +12,7 @@ from mute import tasks
 from mute.config import TaskCfg
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.support.errors import MuteError
-from mute.tasks import DEFAULT_TASK, FLAT_TASK, INDOOR_TASK, make_task, register_task, task_names
+from mute.tasks import DEFAULT_TASK, FLAT_TASK, make_task, register_task, task_names
 
 TABLE_I = {
     "lin_vel_tracking": 1.0,
@@ -60,7 +60,7 @@ def test_the_default_task_asks_for_more_lift_than_the_papers():
 
 
 def test_the_recipe_indoors_is_the_flat_one_over_ground():
-    flat, indoor = make_task(FLAT_TASK), make_task(INDOOR_TASK)
+    flat, indoor = make_task(FLAT_TASK), make_task(DEFAULT_TASK)
     assert (flat.env.terrain.kind, indoor.env.terrain.kind) == ("flat", "indoor")
     ours, theirs = indoor.env.rewards.terms, flat.env.rewards.terms
     assert ours.keys() ^ theirs.keys() == {"lean", "tilt"}
@@ -77,7 +77,7 @@ def test_the_recipe_indoors_is_the_flat_one_over_ground():
 
 
 def test_the_recipe_indoors_has_the_figures_that_ground_takes():
-    flat, indoor = make_task(FLAT_TASK), make_task(INDOOR_TASK)
+    flat, indoor = make_task(FLAT_TASK), make_task(DEFAULT_TASK)
     env = indoor.env
     assert env.rewards.quiet_ramp == (300.0, 800.0)
     assert flat.env.rewards.quiet_ramp[1] < env.rewards.quiet_ramp[0]  # ground is learnt aloud

@@ -20,7 +20,7 @@ from mute.envs.terrain.kinds import Kind
 from mute.envs.terrain.layout import Layout
 from mute.learning.estimated_env import make_estimator
 from mute.learning.symmetry import FEET, JOINTS, POLAR, groups, heights
-from mute.tasks import INDOOR_TASK, make_task
+from mute.tasks import DEFAULT_TASK, make_task
 
 _ACROSS = torch.tensor([1.0, -1.0])
 
@@ -53,7 +53,7 @@ def _pair(kind: str, monkeypatch: pytest.MonkeyPatch) -> QuadrupedEnv:
     """
     monkeypatch.setitem(GROUNDS, "both", {kind: 0.5, "mirrored": 0.5})
     rewards = replace(
-        make_task(INDOOR_TASK).env.rewards,
+        make_task(DEFAULT_TASK).env.rewards,
         phase_source="true",
         guide_ramp=(1.0, 2.0),
         lift_ramp=(0.0, 0.0),

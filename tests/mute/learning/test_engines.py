@@ -1,4 +1,4 @@
-"""Tests that hold the two engines to each other, with the policy that ships, on the CPU.
+"""Tests that hold the two engines to each other, with the policy of flat ground, on the CPU.
 
 MuJoCo Warp computes in float32 and stops its solver at a tolerance of 1e-6, MuJoCo in float64
 and at 1e-8. A foot whose distance to the ground is within rounding of zero touches it a physics
@@ -14,7 +14,7 @@ import dataclasses
 import pytest
 import torch
 from learning_helpers import NUM_STEPS, differences, make_cfg, make_runner
-from places import SHIPPED_POLICY
+from places import FLAT_POLICY
 
 from mute.checkpoint import CheckpointError
 from mute.controllers import LearnedController, load_policy
@@ -25,7 +25,7 @@ from mute.envs.warp_simulation import WarpSimulation
 from mute.evaluation.gait import GaitMeter
 from mute.evaluation.trials import evaluation_cfg
 
-POLICY = load_policy(SHIPPED_POLICY)
+POLICY = load_policy(FLAT_POLICY)
 ENGINES = ("mujoco", "warp")
 
 
