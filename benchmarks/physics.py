@@ -1,9 +1,9 @@
 """Measure what parts of the physics cost, and what they are worth: python -m benchmarks.physics.
 
-The policy of flat ground walks with the exploration of a training, robots differing as in a training.
-Their actions of a rollout are then done again, from the same state, by the bare engine with one
-thing changed at a time. All variants take turns in one process, in an order drawn anew for each
-turn, and are compared with the scene as it is within the turn.
+The policy of flat ground walks with the exploration of a training, robots differing as in a
+training. Their actions of a rollout are then done again, from the same state, by the bare engine
+with one thing changed at a time. All variants take turns in one process, in an order drawn anew for
+each turn, and are compared with the scene as it is within the turn.
 
 A second part has the policy walk without noise in each variant, and compares landing speeds,
 contact forces and work with physics steps of 0.5 ms. A third counts which shapes touch the ground,

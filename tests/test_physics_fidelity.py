@@ -1,6 +1,7 @@
 """The physics that trains, and the one that is heard, against steps of 0.5 ms.
 
-The policy of flat ground walks in all of them; its landing speeds, contact forces and work must agree.
+The policy of flat ground walks in all of them; its landing speeds, contact forces and work must
+agree.
 """
 
 from __future__ import annotations

@@ -141,7 +141,8 @@ def _head() -> str:
     return (
         "<!-- Made by `python -m mute.card --out docs`; do not edit. -->\n\n"
         "# Results\n\n"
-        "All of this is simulated, on flat floors. Gaits are of the model as it is, without sensor "
+        "All of this is simulated, and was measured on flat floors; other ground has a "
+        "[page of its own](terrain.md). Gaits are of the model as it is, without sensor "
         "noise, levels and reliability of robots that differ; "
         "every level is **modelled** ([sound.md](sound.md)). Nothing was measured on a real robot. "
         "This page is made by `python -m mute.card --out docs` from files that the commands "

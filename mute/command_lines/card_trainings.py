@@ -63,8 +63,9 @@ class Recipe:
 
     @property
     def training(self) -> str:
-        """How each seed is trained: checkpoints often enough to tell when it first walks."""
-        return f"python train.py --task {self.task} --seed SEED --agent.save-interval 10"
+        """How each seed is trained: by the command of the one that ships."""
+        command = self.card["command"].replace(" --plain", "")
+        return command.replace(f"--seed {self.card['seed']}", "--seed SEED")
 
     @property
     def folder(self) -> str:

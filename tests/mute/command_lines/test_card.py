@@ -80,17 +80,24 @@ def test_a_robot_that_fell_in_one_training_is_counted(files):
 
 def test_the_recipe_of_flat_ground_has_a_section_of_its_own_where_another_ships(files):
     assert "## On flat ground alone" not in results_page(dataclasses.replace(files, flat=None))
-    flat = dataclasses.replace(files.ships, task="go1_mute_flat")
-    page = results_page(dataclasses.replace(files, flat=flat))
+    page = results_page(files)
     own = page.split("## On flat ground alone")[1].split("\n## ")[0]
     assert "python train.py --task go1_mute_flat --seed SEED" in own
     assert "docs/reliability/go1_mute_flat/" in own
     assert page.count("Not every training of `go1_mute_flat`") == 1
 
 
-def test_the_policy_that_ships_is_the_one_in_the_middle(files):
-    assert sorted(files.ships.seeds) == [0, 1, 2, 3, 4]
-    assert files.ships.card["seed"] == median_seed(files.ships.seeds)
+def test_the_policies_that_ship_are_the_ones_in_the_middle(files):
+    for recipe, seeds in ((files.ships, [0, 1]), (files.flat, [0, 1, 2, 3, 4])):
+        assert sorted(recipe.seeds) == seeds
+        assert recipe.card["seed"] == median_seed(recipe.seeds)
+
+
+def test_how_each_seed_is_trained_is_the_command_of_the_one_that_ships(files):
+    card = files.ships.card | {"seed": 3, "command": "python train.py --task t --seed 3 --plain"}
+    assert dataclasses.replace(files.ships, card=card).training == (
+        "python train.py --task t --seed SEED"
+    )
 
 
 def test_what_the_level_loses_with_beta_is_compared_at_equal_actual_speed(files):
