@@ -2,12 +2,12 @@
 
 Robots walk with the policy of flat ground, in the engine of the CPU. From the same state, with the
 same randomised physics, Warp follows the same set points, and positions, velocities and the
-downward speed of the feet at every physics step are compared. A foot whose distance to the ground is within
-rounding of zero touches it a physics step earlier in one of them, and from there on the two robots
-differ by what such a step moves: so only robots are compared whose contacts agreed at every physics
-step until then, and how many they are is told and must be enough, from step to step. Of all others
-the means over all robots must be the same: height, speed, and how fast feet land. What is not
-finite is within no tolerance. Prints one JSON object.
+downward speed of the feet at every physics step are compared. A foot whose distance to the ground
+is within rounding of zero touches it a physics step earlier in one of them, and from there on the
+two robots differ by what such a step moves: so only robots are compared whose contacts agreed at
+every physics step until then, and how many they are is told and must be enough, from step to step.
+Of all others the means over all robots must be the same: height, speed, and how fast feet land.
+What is not finite is within no tolerance. Prints one JSON object.
 """
 
 from __future__ import annotations
