@@ -29,7 +29,7 @@ from mute.command_lines.paper_measurements import (
     tell_of_others,
     walked_folder,
 )
-from mute.command_lines.paper_walkers import find_walkers
+from mute.command_lines.paper_walkers import find_walkers, place_of_other
 from mute.command_lines.sound_options import tell
 from mute.evaluation.comparison.measurements import DIRTY, FULL, QUICK, Extent, Kept, jobs
 from mute.evaluation.comparison.walkers import Walker
@@ -38,6 +38,7 @@ from mute.evaluation.tables import print_table, read_json, write_csv, write_json
 from mute.support.errors import MuteError
 from mute.support.files import write_file
 from mute.support.plain_data import without_nan
+from mute.support.provenance import place_of
 from mute.support.ranges import Range
 from mute.support.resources import RESOURCES
 from mute.tasks import DEFAULT_TASK
@@ -184,13 +185,15 @@ def _about(walker: Walker) -> dict[str, Any]:
 
 
 def _command(args: PaperArgs, parts: Words) -> str:
-    """Return the command that measures these parts again."""
+    """Return the command that measures these parts again, on whatever machine."""
     words = ["python", "evaluate.py", "paper"]
     default = PaperArgs()
-    for name in ("mute", "dreamwaq", "others", "parts"):
-        values = parts if name == "parts" else getattr(args, name)
+    for name, told in (("mute", place_of), ("dreamwaq", place_of), ("others", place_of_other)):
+        values = getattr(args, name)
         if values != getattr(default, name):
-            words += [f"--{name}", *map(str, values)]
+            words += [f"--{name}", *map(told, values)]
+    if parts != default.parts:
+        words += ["--parts", *parts]
     for name in ("beta", "trials", "seed"):
         if getattr(args, name) != getattr(default, name):
             words += [f"--{name}", str(getattr(args, name))]

@@ -12,8 +12,9 @@ from mute.command_lines.sound_options import load_audible_policy
 from mute.evaluation.comparison.trainings import check_trainings
 from mute.evaluation.comparison.walkers import DREAMWAQ, MPC, MUTE, Walker
 from mute.support.errors import MuteError
+from mute.support.provenance import place_of
 
-__all__ = ["find_walkers"]
+__all__ = ["find_walkers", "place_of_other"]
 
 _NAME = re.compile(r"[\w.+/() -]+")
 """Of a comparison; a comma would look like that before a quiet factor, a bar would end a cell."""
@@ -60,16 +61,27 @@ def _other(word: str) -> Walker:
     Raises:
         MuteError: If its name is none, or that of one of the paper's methods, or it cannot be used.
     """
-    name, named, file = word.partition("=")
-    if Path(word).is_file() or not named:  # a file's own name may have an equals sign
-        return _checked_name(_learnt(None, Path(word)), word)
-    name = name.strip()
-    if not _NAME.fullmatch(name) or not file:
+    name, file = _name_and_file(word)
+    if name is not None and not (_NAME.fullmatch(name) and file):
         raise MuteError(
             "--others must be FILE or NAME=FILE, the name of letters, digits, spaces and . _ - + / "
             f"( ), got {word!r}"
         )
     return _checked_name(_learnt(name, Path(file)), word)
+
+
+def place_of_other(word: str) -> str:
+    """Return one of --others as one would give it on another machine."""
+    name, file = _name_and_file(word)
+    place = place_of(Path(file))
+    return place if name is None else f"{name}={place}"
+
+
+def _name_and_file(word: str) -> tuple[str | None, str]:
+    name, named, file = word.partition("=")
+    if Path(word).is_file() or not named:  # a file's own name may have an equals sign
+        return None, word
+    return name.strip(), file
 
 
 def _checked_name(walker: Walker, word: str) -> Walker:
