@@ -1,4 +1,4 @@
-"""The physics that trains, and the one that is heard, against steps of 0.5 ms.
+"""The physics that measures, and the one that is heard, against steps of 0.5 ms.
 
 The policy of flat ground walks in all of them; its landing speeds, contact forces and work must
 agree.

@@ -22,6 +22,7 @@ from mute.evaluation.reliability.starts import COMMANDS, starts_of
 from mute.evaluation.tables import read_json
 from mute.evaluation.trials import evaluation_cfg, from_the_stance, run_trial
 from mute.evaluation.usual_robots import under_conditions
+from mute.support.provenance import file_sha256
 
 RESOURCES = REPOSITORY / "resources" / "go1"
 
@@ -163,9 +164,17 @@ def test_at_equal_actual_speed_beta_was_measured_to_act(figures):
     assert all(row["apex_mean"] >= 0.03 for row in rows)
 
 
-def test_its_card_tells_where_it_comes_from(policy):
-    card = read_json(RESOURCES / "go1_mute.json")
-    assert card["command"].startswith("python train.py --task go1_mute")
+@pytest.fixture(scope="module", params=["go1_mute", "go1_mute_flat"])
+def each(request) -> str:
+    """A task whose policy ships."""
+    return request.param
+
+
+def test_its_card_tells_where_it_comes_from(each):
+    card, policy = read_json(RESOURCES / f"{each}.json"), load_policy(RESOURCES / f"{each}.pt")
+    assert policy.task == card["task"] == each
+    assert card["figures"]["policy_sha256"] == file_sha256(RESOURCES / f"{each}.pt")
+    assert card["command"].startswith(f"python train.py --task {each} ")
     assert card["seed"] == policy.cfg.env.seed
     assert card["iterations"] == policy.iteration + 1
     assert len(card["commit"].removesuffix("-dirty")) == 40
@@ -174,8 +183,9 @@ def test_its_card_tells_where_it_comes_from(policy):
     )
 
 
-def test_its_onnx_form_is_the_same_policy(policy):
-    session = onnxruntime.InferenceSession(str(RESOURCES / "go1_mute.onnx"))
+def test_its_onnx_form_is_the_same_policy(each):
+    policy = load_policy(RESOURCES / f"{each}.pt")
+    session = onnxruntime.InferenceSession(str(RESOURCES / f"{each}.onnx"))
     controller = LearnedController(policy, 1)
     size = policy.cfg.agent.estimation.network.lstm_hidden
     state = {name: np.zeros((1, size), dtype=np.float32) for name in ("h_in", "c_in")}

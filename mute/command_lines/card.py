@@ -77,7 +77,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         "sound.md": with_part(
             _page("sound.md"),
             "levels",
-            predicted_and_measured(results.noise, results.sweep_beta, results.walk, results.fitted),
+            predicted_and_measured(
+                results.noise, results.sweep_beta, results.walk, results.fitted_here
+            ),
         ),
         "terrain.md": _terrain_page(args.terrain),
         "mpc.md": _mpc_page(args.mpc),
@@ -135,6 +137,7 @@ def read_results(args: CardArgs) -> ResultFiles:
         sweep_beta=_read_rows(beside / "sweep_beta.json", *_LEVELS),
         walk=_read(beside / "walk.json", *_WALK),
         fitted=_fitted_row(),
+        fitted_policy=_read(CALIBRATION_FILE, "policy")["policy"],
         calibration=file_sha256(CALIBRATION_FILE),
     )
 
@@ -146,7 +149,7 @@ def _recipe(task: str, card: Path, folder: Path) -> Recipe:
 _SPEED = ("rates", "options", "num_envs", "turns", "timestep", "machine")
 """What the page on ground tells of speed."""
 _LEVELS = ("robots", "surface", "beta", "mnl_mean", "mnl_ci95", "pnl_mean", "pnl_ci95")
-_WALK = ("beta", "arrived", "mnl_mean", "mnl_ci95", "pnl_mean", "pnl_ci95")
+_WALK = ("policy_sha256", "beta", "arrived", "mnl_mean", "mnl_ci95", "pnl_mean", "pnl_ci95")
 """What the pages tell of levels."""
 
 

@@ -104,23 +104,23 @@ def _walkers_table(walkers: Sequence[Row]) -> str:
 
 
 def _fitted_cell(found: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return the label and the floor whose level is fitted; None if the calibration tells none."""
+    """Return the label and the floor whose level is fitted.
+
+    None if the calibration tells none, or is of a policy that is not compared here.
+    """
     used = found["calibration"]["in_use"]
     known = used["label"] is not None and used["floor"] is not None
-    return (used["label"], used["floor"]) if known else None
+    compared = {None, *(row["sha256"] for row in found["walkers"])}
+    return (used["label"], used["floor"]) if known and used["policy_sha256"] in compared else None
 
 
 def _constant_text(calibration: Mapping[str, Any], fitted: tuple[str, str] | None) -> str:
     used, fits = calibration["in_use"], calibration["fits"]
     share = used["transmissibility"]
-    to_what = (
-        "what it is fitted to, its file does not say."
-        if fitted is None
-        else f"fitted such that {fitted[0]} has the paper's MNL on {fitted[1]} at "
-        f"{EQUAL_SPEED:g} m/s{_with_policy(used)}. That level is marked in the table, and counts "
-        "nowhere as predicted; all else is."
+    text = (
+        f"Of a force at a foot, the share {share:.4f} comes to the robot's shell: "
+        f"{_fitted_to(used, fitted)}"
     )
-    text = f"Of a force at a foot, the share {share:.4f} comes to the robot's shell: {to_what}"
     if not fits:
         return text
     shown = [fit | {"beside": _decibels(fit, share), "ci": fit["mnl_ci95"]} for fit in fits]
@@ -138,9 +138,21 @@ def _constant_text(calibration: Mapping[str, Any], fitted: tuple[str, str] | Non
     )
 
 
-def _with_policy(used: Mapping[str, Any]) -> str:
+def _fitted_to(used: Mapping[str, Any], fitted: tuple[str, str] | None) -> str:
+    """Return in words what the constant is fitted to, and what that leaves to be predicted."""
+    if used["label"] is None or used["floor"] is None:
+        return "what it is fitted to, its file does not say."
     digest = used["policy_sha256"]
-    return "" if digest is None else f" with the policy of SHA-256 {digest[:12]}"
+    policy = "" if digest is None else f" with the policy of SHA-256 {digest[:12]}"
+    left = (
+        "No such policy is compared here: every level is predicted."
+        if fitted is None
+        else "That level is marked in the table, and counts nowhere as predicted; all else is."
+    )
+    return (
+        f"fitted such that {used['label']} has the paper's MNL on {used['floor']} at "
+        f"{EQUAL_SPEED:g} m/s{policy}. {left}"
+    )
 
 
 def _decibels(fit: Row, share: float) -> float | None:

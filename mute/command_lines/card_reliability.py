@@ -144,8 +144,12 @@ def reliability_section(seeds: Mapping[int, SeedFiles], training: str, folder: s
         "that it does not reach, the mean is of the others. What each figure is, is in "
         f"[commands.md](commands.md). Of {len(rows)} targets they meet "
         f"{_listed(runs)}; in the middle, by that and then by how much slower beta 1 lands at "
-        f"0.5 m/s, is seed {median_seed(seeds)}."
+        f"0.5 m/s, is seed {median_seed(seeds)}{_lesser(seeds)}."
     )
+
+
+def _lesser(seeds: Mapping[int, SeedFiles]) -> str:
+    return "" if len(seeds) % 2 else ", the lesser of two"
 
 
 def unmet(seeds: Mapping[int, SeedFiles]) -> str:

@@ -82,8 +82,16 @@ class ResultFiles:
     walk: Mapping[str, Any]
     fitted: tuple[str, str]
     """The paper's row, and the floor, whose mean level the model of the sound is fitted to."""
+    fitted_policy: Mapping[str, Any]
+    """The policy that had that level in the fit: its task, beta and SHA-256."""
     calibration: str
     """SHA-256 of the file of that fit."""
+
+    @property
+    def fitted_here(self) -> tuple[str, str] | None:
+        """That row and floor, if the levels are of that policy."""
+        same = self.fitted_policy["sha256"] == self.walk["policy_sha256"]
+        return self.fitted if same else None
 
 
 def results_page(files: ResultFiles) -> str:
@@ -133,7 +141,7 @@ def summary(files: ResultFiles) -> str:
         "0.5 m/s. The level is the policy's that ships, asked for 0.5 m/s, over "
         f"{levels[0.0]['trials']} trials: modelled; of the real robot the paper measured "
         f"{loud:.1f} dBA at beta 0 and {quiet:.1f} at beta 1. One figure of the model is fitted, "
-        f"to a level on {files.fitted[1]}."
+        f"to a level on {files.fitted[1]}, {_by_whom(files)}."
     )
 
 
@@ -180,8 +188,9 @@ def _noise(files: ResultFiles) -> str:
         f"{_exact_robots(files.noise)}"
         "Equivalent level of each source there (dBA, modelled):\n\n"
         f"{markdown(noise, _SOURCES)}\n\n"
-        "One figure of the model is fitted, to one mean level of the paper's. All else is "
-        "predicted; how well, and from what, is in [sound.md](sound.md#predicted-and-measured). "
+        "One figure of the model is fitted, to one mean level of the paper's, "
+        f"{_by_whom(files)}. All else is predicted; how well, and from what, is in "
+        "[sound.md](sound.md#predicted-and-measured). "
         "Listen: [beta 0 and beta 1 in turns of 3 s](noise/listen-wood.flac), on wood, asked for "
         "0.5 m/s.\n\n"
         "![Levels against actual speed](noise/sweep_speed.png)\n"
@@ -190,6 +199,11 @@ def _noise(files: ResultFiles) -> str:
         "They are drawn by `python evaluate.py sweep-speed`, `sweep-beta` and `walk --beta 0`, "
         "each with `--out docs/noise`."
     )
+
+
+def _by_whom(files: ResultFiles) -> str:
+    """Say whose walk the model of the sound is fitted with."""
+    return f"with the policy of `{files.fitted_policy['task']}`"
 
 
 def _exact_robots(noise: Sequence[Mapping[str, Any]]) -> str:
@@ -272,9 +286,8 @@ def _earlier_levels(recipe: Recipe, files: ResultFiles) -> str:
         f"- The two levels in the table of reliability of `{recipe.task}`, of a stand and of "
         "beta 1 beside beta 0, are "
         f"of an earlier model of the sound (seeds {', '.join(earlier)}), in which drives were "
-        "quieter; all other levels on this page are of the present one. By that, robots that stand "
-        "with noisy sensors have some 58 dBA, above the target, as gears are heard where torques "
-        "change their signs.\n"
+        "quieter; all other levels on this page are of the present one, by which gears are heard "
+        "in a stand, too, where noise of the sensors makes torques change their signs.\n"
     )
 
 

@@ -34,7 +34,7 @@ def predicted_and_measured(
     noise: Sequence[Mapping[str, Any]],
     sweep_beta: Sequence[Mapping[str, Any]],
     walk: Mapping[str, Any],
-    fitted: tuple[str, str],
+    fitted: tuple[str, str] | None,
 ) -> str:
     """Return the part.
 
@@ -42,7 +42,8 @@ def predicted_and_measured(
         noise: Rows of `evaluate.py noise` at 0.5 m/s.
         sweep_beta: Rows of `evaluate.py sweep-beta` at 0.8 m/s on wood.
         walk: What `evaluate.py walk` wrote.
-        fitted: The paper's row, and the floor, whose mean level is fitted.
+        fitted: The paper's row, and the floor, whose mean level is fitted; None if that level is
+            of another policy than these.
 
     Raises:
         MuteError: If one lacks what the part is made of.
@@ -79,13 +80,13 @@ def predicted_and_measured(
 
 
 def _if_fitted_elsewhere(
-    usual: Mapping[tuple[str, float], Mapping[str, Any]], fitted: tuple[str, str]
+    usual: Mapping[tuple[str, float], Mapping[str, Any]], fitted: tuple[str, str] | None
 ) -> str:
     """Tell what the error would be had another row been fitted, by the levels of the sources.
 
     Args:
         usual: Rows by floor and beta.
-        fitted: The row that is.
+        fitted: The row that is, if it is one of them.
     """
     levels = {
         (method, surface): (usual[surface, beta], PAPER_LEVELS[method][surface][0])
@@ -176,7 +177,7 @@ def _at_08(fast: Mapping[float, Mapping[str, Any]]) -> str:
 
 
 def _row(
-    method: str, surface: str, row: Mapping[str, Any] | None, fitted_row: tuple[str, str]
+    method: str, surface: str, row: Mapping[str, Any] | None, fitted_row: tuple[str, str] | None
 ) -> dict[str, Any]:
     """Return a level of the paper beside the model's, which there is none of without a policy."""
     paper = PAPER_LEVELS[method][surface]

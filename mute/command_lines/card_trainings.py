@@ -149,7 +149,8 @@ def policy_figures(recipe: Recipe) -> str:
     card, figures = recipe.card, recipe.card["figures"]
     in_cm = [row | {"apex_cm": times(row["apex_mean"], 100.0)} for row in figures["at_speed"]]
     return (
-        f"`{card['command']}`, seed {card['seed']}, commit {card['commit'][:10]}: "
+        f"`{card['command']}`{_then_called(card)}, seed {card['seed']}, commit "
+        f"{card['commit'][:10]}: "
         f"{card['iterations']} iterations, {card['steps'] / 1e6:.1f} M steps, "
         f"{card['wall_time_minutes']:.0f} min on {card['machine']}. Its files and the figures of "
         "this section are made by `python -m mute.release --checkpoint "
@@ -160,6 +161,12 @@ def policy_figures(recipe: Recipe) -> str:
         f"At an actual forward speed of {figures['speed']:g} m/s:\n\n"
         f"{markdown(in_cm, _AT_SPEED)}"
     )
+
+
+def _then_called(card: Mapping[str, Any]) -> str:
+    """Tell what the task was called when the policy was trained, if that was another name."""
+    then = card.get("task_then")
+    return "" if then is None else f" (the task was called `{then}` then)"
 
 
 def _first_walk(recipe: Recipe) -> str:

@@ -117,8 +117,8 @@ class PlayArgs(DriverArgs):
     """How difficult it is, 0 to 4."""
     surface: str | None = None
     """Floor to walk on and to hear, with physics at 1 ms: wood, parquet, laminate, carpet,
-    tile or concrete. Unless given, training's floor and physics, with a level (modelled, sounding
-    as wood); with --sound, --wav or --video, wood."""
+    tile or concrete. Unless given, training's floor in steps of 5 ms at most, with a level
+    (modelled, sounding as wood); with --sound, --wav or --video, wood."""
     sources: Sources = SOURCES
     microphone: MicrophonePlace = "trunk"
     sound: bool = False

@@ -69,15 +69,15 @@ class TrainArgs:
     task: str = DEFAULT_TASK
     """Task to learn; `module:task` imports a module of yours first, which registers it."""
     num_envs: int | None = None
-    """Number of robots, of each rank where torchrun starts several; by default what suits the
-    machine."""
+    """Number of robots, of each rank where torchrun starts several; by default the task's, and more
+    of go1_mute_flat on a GPU."""
     iterations: int | None = None
     """Rollouts and updates in all, those before a --resume included."""
     seed: int | None = None
     """Seed of everything random."""
     device: str = "auto"
-    """auto, cpu or cuda: where networks and physics live; with torchrun, each rank has a GPU of its
-    own."""
+    """auto, cpu or cuda: where networks live, and physics unless the task has it on the CPU; with
+    torchrun, each rank has a GPU of its own."""
     run_name: str = ""
     """Name of the run; by default the date and time."""
     log_dir: Path = Path("runs")

@@ -111,9 +111,10 @@ def test_terms_and_weights_in_one_reward_are_refused():
         from_plain(plain)
 
 
-def test_the_policy_that_ships_was_trained_with_the_rewards_of_its_task():
-    saved = load_checkpoint(REPOSITORY / "resources" / "go1" / "go1_mute.pt")
-    assert from_plain(saved["config"]).env.rewards == make_task("go1_mute").env.rewards
+@pytest.mark.parametrize("task", ["go1_mute", "go1_mute_flat"])
+def test_a_policy_that_ships_was_trained_with_the_rewards_of_its_task(task):
+    saved = load_checkpoint(REPOSITORY / "resources" / "go1" / f"{task}.pt")
+    assert from_plain(saved["config"]).env.rewards == make_task(task).env.rewards
 
 
 @pytest.mark.parametrize("name", ["landing_speed", "apex_target"])

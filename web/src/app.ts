@@ -158,8 +158,7 @@ export class App implements PanelActions {
     this.comparing.stop();
     this.live.setGround(ground, level);
     this.keep({ ground, level });
-    const stairs =
-      "The policy that ships has learnt on flat floors alone: it may stumble and fall.";
+    const stairs = "Stairs lie ahead: who has learnt on flat floors alone stumbles and falls.";
     this.panel.tell(ground === "flat" ? "The ground is flat." : stairs);
   }
 

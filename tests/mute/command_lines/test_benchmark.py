@@ -24,7 +24,7 @@ from mute.envs.quadruped_env import NUM_ACTIONS
 from mute.envs.scene import STAND_JOINT_POS, build_scene
 from mute.support import provenance
 from mute.support.errors import MuteError
-from mute.tasks import DEFAULT_TASK, make_task
+from mute.tasks import FLAT_TASK, make_task
 
 _PARTS = ("engine", "nominal_engine", "environment", "collection", "learning", "loop")
 
@@ -331,7 +331,7 @@ def test_a_version_that_changes_while_it_is_measured_is_refused():
 
 
 def test_the_robots_of_gymnasium_move_as_those_of_the_engine():
-    cfg = make_task(DEFAULT_TASK).env
+    cfg = make_task(FLAT_TASK).env
     simulation = BatchSimulation(build_scene(cfg.scene, pictured=False), 1)
     model, batch = simulation.model, simulation._batch
     ctrl, qpos = batch.bind("ctrl"), batch.bind("qpos")

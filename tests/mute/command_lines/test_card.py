@@ -120,15 +120,27 @@ def test_what_the_level_loses_with_beta_is_compared_at_equal_actual_speed(files)
     assert "at the same actual speed, 0.4 to 0.7 m/s" in page  # beta 1 gets to 0.72
 
 
+def test_a_level_counts_as_fitted_only_where_it_is_of_the_policy_of_the_fit(files):
+    row = ("mute beta 0", "wood")
+    policy = {"task": "someones", "sha256": files.walk["policy_sha256"]}
+    same = dataclasses.replace(files, fitted=row, fitted_policy=policy)
+    assert same.fitted_here == row
+    other = dataclasses.replace(same, fitted_policy=policy | {"sha256": "0" * 64})
+    assert other.fitted_here is None
+    assert "to a level on wood, with the policy of `someones`" in summary(other)
+
+
 def test_levels_of_an_earlier_calibration_are_told_with_their_seeds(files):
+    files = dataclasses.replace(files, flat=None)
+
     def changed(seed, run):
-        calibration = "another" if seed in (1, 3) else files.calibration
+        calibration = "another" if seed == 1 else files.calibration
         return dataclasses.replace(
             run, reliability=run.reliability | {"calibration_sha256": calibration}
         )
 
     seeds = {seed: changed(seed, run) for seed, run in files.ships.seeds.items()}
-    assert "model of the sound (seeds 1, 3)" in results_page(_with(files, seeds))
+    assert "model of the sound (seeds 1)" in results_page(_with(files, seeds))
     same = {seed: changed(0, run) for seed, run in files.ships.seeds.items()}
     assert "earlier model" not in results_page(_with(files, same))
 

@@ -54,6 +54,7 @@ def test_the_error_is_over_the_rows_that_were_not_fitted():
     assert f"over the 4 MNL that were not fitted: **{math.sqrt(50.0 / 4.0):.1f} dBA**" in _part(
         fitted=("dreamwaq", "wood")
     )
+    assert "over the 4 MNL" in _part(fitted=None)
 
 
 def test_every_row_of_the_paper_is_there_with_or_without_a_level():

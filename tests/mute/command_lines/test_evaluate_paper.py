@@ -17,6 +17,7 @@ from mute.acoustics import origin
 from mute.command_lines import evaluate, evaluate_paper, paper_calibration, paper_measurements
 from mute.command_lines.card_comparison import comparison_report
 from mute.support.errors import MuteError
+from mute.support.provenance import file_sha256
 
 
 def _row(label: str, part: str, surface: str, beta: float, speed: float) -> dict[str, Any]:
@@ -71,7 +72,7 @@ def measured(monkeypatch) -> list[str]:
     monkeypatch.setattr(paper_measurements, "measure", measure)
     monkeypatch.setattr(paper_calibration, "fitted", fitted)
     used = {"transmissibility": 0.03, "label": "MUTE, beta 0", "floor": "wood"}
-    used["policy_sha256"] = "5" * 64
+    used["policy_sha256"] = file_sha256(SHIPPED_POLICY)
     monkeypatch.setattr(evaluate_paper, "constant_in_use", lambda: used)
     return done
 
@@ -250,7 +251,12 @@ def test_the_report_of_the_same_figures_is_the_same_byte_for_byte(tmp_path, meas
     assert "| MPC > DreamWaQ > MUTE, beta 1 on wood, without MUTE, beta 0, which is fit" in report
     assert "| MPC > DreamWaQ > MUTE, beta 0 > MUTE, beta 1 on carpet | 75.5 > 72.5 >" in report
     assert "the share 0.0300 comes to the robot's shell: fitted such that MUTE, beta 0" in report
-    assert "with the policy of SHA-256 555555555555. That level is marked" in report
+    assert f"with the policy of SHA-256 {file_sha256(SHIPPED_POLICY)[:12]}. That level" in report
+    found = _found(one)
+    found["calibration"]["in_use"]["policy_sha256"] = "5" * 64
+    others = comparison_report(found)
+    assert "SHA-256 555555555555. No such policy is compared here" in others
+    assert "(fitted)" not in others
     # 20 log10(0.06 / 0.03) is 6.02.
     assert "| 0.0600 | +6.0 | ± 0.2 | - |" in report
     assert "| quieter at every step of beta, 0.8 m/s on wood | 10 of 10 steps" in report

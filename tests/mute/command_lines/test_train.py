@@ -293,9 +293,10 @@ def test_help_is_no_mistake(capsys):
     ("device", "options", "expected"),
     [
         ("cpu", [], 1024),
-        ("cuda", [], 4096),
-        ("cuda", ["--num-envs", "7"], 7),
-        ("cuda", ["--env.num-envs", "1024"], 1024),
+        ("cuda", [], 1024),  # whose physics is on the CPU all the same
+        ("cuda", ["--task", "go1_mute_flat"], 4096),
+        ("cuda", ["--task", "go1_mute_flat", "--num-envs", "7"], 7),
+        ("cuda", ["--task", "go1_mute_flat", "--env.num-envs", "1024"], 1024),
     ],
 )
 def test_the_number_of_robots_suits_the_device_unless_it_is_given(

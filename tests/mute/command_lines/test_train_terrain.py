@@ -10,10 +10,11 @@ _LEVELS = {"Ground/level_rooms", "Ground/level_stairs", "Ground/level_stairs_dow
 
 
 def test_a_training_over_ground_shows_its_levels_goes_on_and_keeps_its_kind(tmp_path, capsys):
-    ground = ("--env.terrain.kind", "indoor", "--num-envs", "16", "--log-dir", str(tmp_path))
+    ground = ("--task", "go1_mute_flat", "--env.terrain.kind", "indoor", "--num-envs", "16")
+    ground += ("--log-dir", str(tmp_path))
     assert train_tiny(*ground, "--run-name", "a", "--iterations", "1") == 0
-    run = tmp_path / "go1_mute" / "a"
-    resume = ("--resume", str(run / "model_0.pt"), "--iterations", "2")
+    run = tmp_path / "go1_mute_flat" / "a"
+    resume = ("--task", "go1_mute_flat", "--resume", str(run / "model_0.pt"), "--iterations", "2")
     capsys.readouterr()
     for option, value in (("kind", "rough"), ("first-levels", "2 3")):
         words = ["--plain", *resume, f"--env.terrain.{option}", *value.split()]

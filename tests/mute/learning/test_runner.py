@@ -268,12 +268,12 @@ def test_the_random_start_ages_come_with_a_new_run_alone(whole_run, monkeypatch)
 
 
 def test_the_estimator_learns_the_velocity_of_a_moving_robot():
-    cfg = make_task("go1_mute")
+    cfg = make_task("go1_mute_flat")
     cfg.env.num_envs, cfg.agent.iterations = 64, 25
     cfg.env.num_threads, cfg.agent.estimation.num_mini_batches = 1, 8
     cfg.agent.ppo.num_learning_epochs = cfg.agent.ppo.num_mini_batches = 1
     cfg.agent.ppo.schedule, cfg.agent.ppo.learning_rate = "fixed", 1e-4
-    runner = MuteRunner("go1_mute", cfg, None)
+    runner = MuteRunner("go1_mute_flat", cfg, None)
     shares = []
     update = runner.alg.trainer.update
 

