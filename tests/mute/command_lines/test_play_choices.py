@@ -94,7 +94,7 @@ def test_a_policy_that_is_missing_or_of_other_robots_is_refused_before_the_walk(
 
 
 def test_a_policy_of_other_robots_is_told_by_what_differs():
-    ours = make_task("go1_mute").env
+    ours = make_task("go1_mute_flat").env
     assert misfit(make_task("go1_dreamwaq").env, ours) is None
     stiff = dataclasses.replace(ours, scene=dataclasses.replace(ours.scene, stiffness=28.0))
     assert misfit(stiff, ours) == (
