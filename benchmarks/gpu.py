@@ -150,14 +150,21 @@ def _parts(args: argparse.Namespace, folder: Path) -> list[Part]:
     device = "cpu" if tiny else "cuda"
     python = sys.executable
     peers = ["--peers-from", str(args.peers_from.absolute())] if args.peers_from else []
-    robots, iterations = (16, 2) if tiny else (4096, 60)
-    runs = folder / "runs"
     engines = ["--num-envs", "8", "--steps", "10"] if tiny else []
-    training = [
-        *(python, "-m", "benchmarks.gpu_training", "--task", "go1_mute_flat", "--device", device),
-        *("--num-envs", str(robots), "--iterations", str(iterations), "--plain"),
-        *("--log-dir", str(runs), "--run-name", "gpu"),
-    ]
+
+    def training(name: str, task: str, robots: int, iterations: int, limit: float) -> Part:
+        runs = folder / name
+        command = [
+            *(python, "-m", "benchmarks.gpu_training", "--task", task, "--device", device),
+            *("--num-envs", str(robots), "--iterations", str(iterations), "--plain"),
+            *("--log-dir", str(runs), "--run-name", "gpu"),
+        ]
+        return Part(
+            name,
+            tuple(command),
+            limit,
+            lambda said: _curves(runs, robots, iterations) | _memory(said),
+        )
 
     def rates(num_envs: int) -> Part:
         rounds = "1" if tiny else "6"
@@ -165,7 +172,7 @@ def _parts(args: argparse.Namespace, folder: Path) -> list[Part]:
             *(python, "-m", "benchmarks.gpu_rates", "--device", device, *peers),
             *("--num-envs", str(num_envs), "--rounds", rounds),
         ]
-        return Part(f"rates_{num_envs}", tuple(command), 140.0, _last_line)
+        return Part(f"rates_{num_envs}", tuple(command), 120.0, _last_line)
 
     return [
         Part(
@@ -174,12 +181,9 @@ def _parts(args: argparse.Namespace, folder: Path) -> list[Part]:
             150.0,
             _last_line,
         ),
-        Part(
-            "training",
-            tuple(training),
-            170.0,
-            lambda said: _curves(runs, robots, iterations) | _memory(said),
-        ),
+        training("training", "go1_mute_flat", *((16, 2) if tiny else (4096, 60)), limit=160.0),
+        # Networks on the GPU, robots on the CPU.
+        training("over_ground", "go1_mute", *((16, 2) if tiny else (1024, 10)), limit=50.0),
         *(rates(number) for number in ((8, 16) if tiny else (4096, 16384))),
     ]
 

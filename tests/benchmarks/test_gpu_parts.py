@@ -174,7 +174,7 @@ def _words(part: Part) -> list[str]:
     """Return the options of a part's program, which is a module."""
     python, option, module, *words = part.command
     assert (python, option) == (sys.executable, "-m")
-    modules = {"rates": "gpu_rates"}
+    modules = {"over": "gpu_training"}
     name = part.name.split("_")[0]
     assert module == f"benchmarks.{modules.get(name, 'gpu_' + name)}"
     return words
@@ -189,20 +189,22 @@ def test_every_part_is_asked_for_what_its_program_knows(
 ):
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     argv = [*argv, "--peers-from", str(tmp_path)]
-    engines, training, *rates = gpu._parts(gpu._arguments(argv), tmp_path)
+    engines, training, ground, *rates = gpu._parts(gpu._arguments(argv), tmp_path)
     assert parse(gpu_engines.GpuEnginesArgs, _words(engines), "").device == device
     args, _ = train._arguments(_words(training))
     assert (args.task, args.device, args.num_envs) == ("go1_mute_flat", device, robots)
+    args, _ = train._arguments(_words(ground))
+    assert (args.task, args.device) == ("go1_mute", device)
     asked = [parse(gpu_rates.GpuRatesArgs, _words(part), "") for part in rates]
     assert [each.num_envs for each in asked] == sizes
     assert {(each.device, each.peers_from) for each in asked} == {(device, tmp_path)}
-    assert sum(part.limit for part in (engines, training, *rates)) <= 600.0
+    assert sum(part.limit for part in (engines, training, ground, *rates)) <= 600.0
 
 
 def test_the_curves_of_a_training_tell_its_speed_and_its_last_reward(tmp_path):
     args = gpu._arguments(["--dry-run-on-cpu"])
     training = gpu._parts(args, tmp_path)[1]
-    run = tmp_path / "runs" / "go1_mute" / "gpu"
+    run = tmp_path / "training" / "go1_mute_flat" / "gpu"
     run.mkdir(parents=True)
     rows = [
         {"iteration": number, "Perf/total_fps": rate, "Train/mean_reward": reward}
