@@ -137,8 +137,8 @@ def summary(files: ResultFiles) -> str:
     return (
         f"{markdown(rows, _SUMMARY)}\n\n"
         f"Mean ± standard deviation over {len(runs)} trainings, seeds {seeds}, of "
-        f"{files.ships.card['iterations']} iterations, on flat floors. Landing speed "
-        "and lift are at an *actual* 0.5 m/s. The level is the policy's that ships, asked for 0.5 m/s, over "
+        f"{files.ships.card['iterations']} iterations, on flat floors. Landing speed and lift are "
+        "at an *actual* 0.5 m/s. The level is the policy's that ships, asked for 0.5 m/s, over "
         f"{levels[0.0]['trials']} trials: modelled; of the real robot the paper measured "
         f"{loud:.1f} dBA at beta 0 and {quiet:.1f} at beta 1. One figure of the model is fitted, "
         f"to a level on {files.fitted[1]}, {_by_whom(files)}."
