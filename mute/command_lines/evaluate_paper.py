@@ -188,10 +188,12 @@ def _command(args: PaperArgs, parts: Words) -> str:
     """Return the command that measures these parts again, on whatever machine."""
     words = ["python", "evaluate.py", "paper"]
     default = PaperArgs()
-    for name, told in (("mute", place_of), ("dreamwaq", place_of), ("others", place_of_other)):
-        values = getattr(args, name)
-        if values != getattr(default, name):
-            words += [f"--{name}", *map(told, values)]
+    if args.mute != default.mute:
+        words += ["--mute", *map(place_of, args.mute)]
+    if args.dreamwaq != default.dreamwaq:
+        words += ["--dreamwaq", *map(place_of, args.dreamwaq)]
+    if args.others:
+        words += ["--others", *map(place_of_other, args.others)]
     if parts != default.parts:
         words += ["--parts", *parts]
     for name in ("beta", "trials", "seed"):
