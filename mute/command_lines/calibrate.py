@@ -50,6 +50,8 @@ from mute.evaluation.usual_robots import robots_cfg
 from mute.support.errors import MuteError
 from mute.support.provenance import current_commit, file_sha256, machine_kind, place_of
 from mute.support.ranges import Range
+from mute.support.resources import RESOURCES
+from mute.tasks import FLAT_TASK
 
 __all__ = ["REFERENCES", "CalibrationArgs", "fit_share", "fitted", "main", "provenance"]
 
@@ -70,6 +72,9 @@ class CalibrationArgs(PolicyArgs):
     The policy stands for the one that the paper measured.
     """
 
+    policy: Path = RESOURCES / "go1" / f"{FLAT_TASK}.pt"
+    """Policy that walks, a checkpoint, or 'latest' for the newest one under --log-dir; by default
+    that of go1_mute_flat."""
     reference: Literal["mute", "dreamwaq"] = "mute"
     """The paper's row to fit: MUTE with beta = 0, or DreamWaQ."""
     floor: Literal["wood", "carpet", "tile"] = "wood"

@@ -67,7 +67,7 @@ class PolicyArgs:
             return latest_checkpoint(self.log_dir, self.task)
         if self.task is None:
             return self.policy
-        if self.policy == _SHIPPED:
+        if self.policy == type(self).policy:  # the default
             return _that_ships(self.task)
         if self.policy.suffix == ".onnx":
             raise MuteError(

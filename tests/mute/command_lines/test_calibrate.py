@@ -8,7 +8,7 @@ import math
 import shlex
 
 import pytest
-from places import REPOSITORY, SHIPPED_POLICY
+from places import FLAT_POLICY, REPOSITORY
 
 from mute.acoustics.body import load_transmissibility
 from mute.command_lines import calibrate as calibration
@@ -43,7 +43,7 @@ def test_a_calibration_reaches_the_papers_level_and_is_near_the_one_that_ships(t
     ratio = load_transmissibility(out) / load_transmissibility()
     assert 20.0 * math.log10(ratio) == pytest.approx(0.0, abs=4.0)
     assert "--trials 4 --seconds 2 " in content["command"]
-    assert content["policy"]["iteration"] == load_policy(SHIPPED_POLICY).iteration
+    assert content["policy"]["iteration"] == load_policy(FLAT_POLICY).iteration
 
 
 @pytest.mark.parametrize(
@@ -66,11 +66,11 @@ def test_a_bad_argument_of_the_calibration_is_refused_in_one_line(arguments, wor
 def test_a_calibration_says_by_which_command_and_policy_file_they_were_made():
     out = REPOSITORY / "some where" / "calibration.json"
     args = calibration.CalibrationArgs(out=out)
-    origin = calibration.provenance(args, load_policy(SHIPPED_POLICY))
+    origin = calibration.provenance(args, load_policy(FLAT_POLICY))
     assert shlex.split(origin["command"]) == [
-        "python", "-m", "mute.acoustics.calibration", "--policy", "resources/go1/go1_mute.pt",
+        "python", "-m", "mute.acoustics.calibration", "--policy", "resources/go1/go1_mute_flat.pt",
         "--reference", "mute", "--floor", "wood", "--speed", "0.5", "--trials", "64",
         "--seconds", "3", "--seed", "1", "--out", "some where/calibration.json",
     ]  # fmt: skip
-    assert origin["policy"]["sha256"] == hashlib.sha256(SHIPPED_POLICY.read_bytes()).hexdigest()
+    assert origin["policy"]["sha256"] == hashlib.sha256(FLAT_POLICY.read_bytes()).hexdigest()
     assert origin["commit"]

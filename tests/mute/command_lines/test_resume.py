@@ -138,7 +138,7 @@ def test_an_option_that_a_resumed_run_cannot_heed_is_refused(arguments, words, f
         ("--agent.activation", "relu", "agent.activation: a resumed run keeps 'elu', got 'relu'"),
         ("--agent.init-std", "0.5", "agent.init_std: a resumed run keeps 0.8, got 0.5"),
         ("--env.height-map.scale", "0.2", "env.height_map.scale: a resumed run keeps 0.1, got"),
-        ("--env.scene.timestep", "0.004", "env.scene.timestep: a resumed run keeps 0.005, got"),
+        ("--env.scene.timestep", "0.004", "env.scene.timestep: a resumed run keeps 0.01, got"),
         ("--env.footfall.landing-window", "0.06", "env.footfall.landing_window: a resumed run"),
         ("--num-envs", "16", "env.num_envs: a resumed run keeps 32, got 16"),
         ("--env.randomization.gain-scale", "0.8 1.2", "env.randomization.gain_scale: a resumed"),
