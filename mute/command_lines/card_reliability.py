@@ -107,13 +107,13 @@ def _check_alike(paths: Mapping[int, Path], files: Mapping[int, SeedFiles]) -> N
 def median_seed(seeds: Mapping[int, SeedFiles]) -> int:
     """Return the seed in the middle, by targets met and then by how much slower beta 1 lands.
 
-    Of an even number of seeds it is the lesser one of the two in the middle.
+    Of an even number of seeds it is the better one of the two in the middle.
 
     Args:
         seeds: Files of one seed or more.
     """
     order = sorted(seeds, key=lambda seed: (seeds[seed].targets_met, _slower(seeds[seed]), seed))
-    return order[(len(order) - 1) // 2]
+    return order[len(order) // 2]
 
 
 def _slower(run: SeedFiles) -> float:
@@ -144,12 +144,12 @@ def reliability_section(seeds: Mapping[int, SeedFiles], training: str, folder: s
         "that it does not reach, the mean is of the others. What each figure is, is in "
         f"[commands.md](commands.md). Of {len(rows)} targets they meet "
         f"{_listed(runs)}; in the middle, by that and then by how much slower beta 1 lands at "
-        f"0.5 m/s, is seed {median_seed(seeds)}{_lesser(seeds)}."
+        f"0.5 m/s, is seed {median_seed(seeds)}{_better(seeds)}."
     )
 
 
-def _lesser(seeds: Mapping[int, SeedFiles]) -> str:
-    return "" if len(seeds) % 2 else ", the lesser of two"
+def _better(seeds: Mapping[int, SeedFiles]) -> str:
+    return "" if len(seeds) % 2 else ", the better of two"
 
 
 def unmet(seeds: Mapping[int, SeedFiles]) -> str:
