@@ -83,6 +83,7 @@ def test_the_recipe_of_flat_ground_has_a_section_of_its_own_where_another_ships(
     page = results_page(files)
     own = page.split("## On flat ground alone")[1].split("\n## ")[0]
     assert "python train.py --task go1_mute_flat --seed SEED" in own
+    assert own.count("(the task was called `go1_mute` then)") == 1
     assert "docs/reliability/go1_mute_flat/" in own
     assert page.count("Not every training of `go1_mute_flat`") == 1
 
