@@ -301,7 +301,7 @@ def test_other_policies_are_compared_under_their_names_or_their_tasks(tmp_path, 
         ({"action_scale": 0.3}, "it has env.action_scale 0.3, not 0.25"),
         ({"gamma": 0.9}, "it has agent.ppo.gamma 0.9, not 0.99; compare it under a name of"),
         ({"num_threads": 3}, "both are of seed "),
-        ({"seed": 7, "iteration": 9}, "it has last iteration 9, not 749"),
+        ({"seed": 7, "iteration": 9}, "it has last iteration 9, not 2399"),
     ],
 )
 @pytest.mark.parametrize("option", ["mute", "others"])

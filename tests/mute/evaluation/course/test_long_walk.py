@@ -109,7 +109,7 @@ def test_the_power_is_not_sampled_at_the_control_rate(monkeypatch):
     )
     env = make_walk_env(load_policy(POLICY), STRAIGHT, seed=1)
     [result] = follow_course(env, _Falling(env, step=75), STRAIGHT, beta=0.0, from_energies=True)
-    assert 10.0 < result.gait.power < 50.0
+    assert 10.0 < result.gait.power < 100.0
 
 
 def test_every_reading_has_its_time_place_and_floor(walk):
