@@ -1,4 +1,4 @@
-"""The walks that the page's sound is held to: the policy that ships, as Python hears it."""
+"""The walks that the page's sound is held to: the policy of flat ground, as Python hears it."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import FLAT_POLICY
 
 from mute.support.provenance import file_sha256
-from mute.support.resources import RESOURCES
 from mute.web.sound_references import STEPS, heard_figures, read_walk
 
 KEPT = Path(__file__).parents[3] / "web" / "test" / "sound" / "reference"
@@ -20,8 +20,8 @@ def references():
     return json.loads((KEPT / "references.json").read_text())
 
 
-def test_they_are_of_the_policy_that_ships(references):
-    assert references["policy_sha256"] == file_sha256(RESOURCES / "go1" / "go1_mute.pt")
+def test_they_are_of_the_policy_of_flat_ground(references):
+    assert references["policy_sha256"] == file_sha256(FLAT_POLICY)
     assert references["steps"] == STEPS
 
 

@@ -126,7 +126,7 @@ test("beginning anew is silent but for the fan, and does not click", () => {
     soundscape.render(after.subarray(step * STEP, (step + 1) * STEP));
   }
   assert.ok(steepest(before, after) <= 1.01 * steepest(before), "it clicks");
-  assert.ok(level(after) < level(before) - 35, `${level(after)} dBA`);
+  assert.ok(level(after) < 20, `${level(after)} dBA`);
   const anew = render(soundscape, 0, 700);
   assert.ok(Math.abs(level(anew) - level(before)) < 0.5, `${level(anew)} for ${level(before)} dBA`);
 });
@@ -201,7 +201,7 @@ test("after a hidden tab, whose steps come all at once, there is no burst and no
   assert.ok(playback.waiting < 0.3, `${playback.waiting} s behind`);
   const peak = (sound: Float32Array) => sound.reduce((most, own) => Math.max(most, Math.abs(own)), 0);
   assert.ok(peak(after) < 1.2 * peak(before), `${peak(after)} Pa after ${peak(before)} Pa`);
-  assert.ok(playback.meter.pnl < loudest + 3, `${playback.meter.pnl} dBA after ${loudest} dBA`);
+  assert.ok(playback.meter.pnl < loudest + 1, `${playback.meter.pnl} dBA after ${loudest} dBA`);
   assert.ok(steepest(before, drained, after) < 1.3 * steepest(before), "it clicks");
 });
 
