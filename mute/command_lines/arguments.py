@@ -124,9 +124,14 @@ def spelled(args: Any, names: Sequence[str]) -> str:  # noqa: ANN401
     words: list[str] = []
     for field in dataclasses.fields(args):
         value = getattr(args, field.name)
-        if field.name in names and value != field.default:
+        if field.name not in names or value == field.default:
+            continue
+        option = field.name.replace("_", "-")
+        if isinstance(value, bool):
+            words.append(f"--{option}" if value else f"--no-{option}")
+        else:
             values = value if isinstance(value, tuple) else (value,)
-            words += [f"--{field.name.replace('_', '-')}", *map(str, values)]
+            words += [f"--{option}", *map(str, values)]
     return "".join(f" {word}" for word in words)
 
 

@@ -51,7 +51,7 @@ _TRACKING_MINUTES = 10.0
 
 _MEASURING = (
     *("parts", "kinds", "levels", "episodes", "seconds", "speed", "beta", "walkers", "minutes"),
-    "seed",
+    *("heading_hold", "seed"),
 )
 """Options that change what is measured."""
 
@@ -83,6 +83,8 @@ class TerrainArgs(PolicyArgs):
     seed of tracking."""
     minutes: float = 30.0
     """How long those walk, min."""
+    heading_hold: bool = True
+    """Whether a policy that holds its heading does; without, its robots drift, as in training."""
     seed: int = 1
     """Seed of ground, robots, first states, noise, pushes and commands."""
     out: Path = Path("evaluation")
@@ -114,6 +116,8 @@ def terrain(args: TerrainArgs) -> int:
     _check(args)
     args = args.with_policy_found()
     policy = load_policy(args.policy)
+    if not args.heading_hold:
+        policy = policy.without_heading_hold()
     make_directory(args.out)
     torch.set_num_threads(1)  # the physics engine has the cores
     tasks = [task for task in _tasks(args, policy) if task.part in args.parts]

@@ -138,3 +138,19 @@ def test_a_bad_argument_is_told_by_name(words, message, tmp_path):
     with pytest.raises(MuteError, match=message):
         evaluate.main(["terrain", "--out", str(tmp_path), *words])
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_heading_is_held_unless_it_is_told_not_to(tmp_path, capsys):
+    runner = make_runner()
+    runner.task_cfg.agent.heading_gain = 50.0
+    checkpoint = runner.alg.save() | {"task": "go1_mute", "iter": 0}
+    path = tmp_path / "holds.pt"
+    save_checkpoint(path, policy_part(checkpoint | {"config": to_plain(runner.task_cfg)}))
+    made = []
+    for more in ([], ["--no-heading-hold"]):
+        words = _words(path, tmp_path, "--kinds", "flat", "--json", *more)
+        assert evaluate.main(words) == 0
+        printed = json.loads(capsys.readouterr().out)
+        assert ("--no-heading-hold" in printed["options"].split()) == bool(more)
+        made.append(printed["crossings"][0]["made"])
+    assert made[0] != made[1]
