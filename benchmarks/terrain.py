@@ -29,7 +29,7 @@ from mute.command_lines.arguments import check_option, command_line, make_direct
 from mute.controllers import LearnedController, load_policy
 from mute.controllers.learned import Policy
 from mute.envs.quadruped_env import NUM_ACTIONS, QuadrupedEnv
-from mute.envs.randomization import full_randomization
+from mute.envs.randomization import RandomizationCfg, full_randomization
 from mute.envs.terrain import TerrainCfg
 from mute.evaluation.intervals import median_interval
 from mute.evaluation.tables import print_table, write_json
@@ -94,8 +94,9 @@ class _Rollouts:
             engine="mujoco",
             terrain=TerrainCfg(kind=kind, first_levels=_LEVELS, curriculum=False),
         )
-        if differ:
-            cfg = dataclasses.replace(cfg, randomization=full_randomization())
+        # Whatever robots the policy was trained with, as usual or all of them differ.
+        robots = full_randomization() if differ else RandomizationCfg()
+        cfg = dataclasses.replace(cfg, randomization=robots)
         self.name = name
         self._env = QuadrupedEnv(cfg)
         self._controller = LearnedController(policy, num_envs)

@@ -117,13 +117,14 @@ class CommandSampler:
         """Which environments are asked to stand still. Shape: (num_envs,)."""
         return (self.command[:, :BETA] == 0.0).all(dim=1)
 
-    def largest(self, progress: float = 1.0) -> float:
-        """Return the largest forward speed that is asked for, m/s.
+    def speeds_ahead(self, progress: float = 1.0) -> tuple[float, float]:
+        """Return the lowest and the largest forward speed that may be asked for, m/s.
 
         Args:
             progress: How far the ranges have grown, see `resample`.
         """
-        return self.cfg.lin_vel_x[1] * self._grown(progress)
+        low, high = (self._grown(progress) * speed for speed in self.cfg.lin_vel_x)
+        return min(max(low, self.cfg.deadband), high), high
 
     def resample(self, mask: torch.Tensor, with_beta: bool, progress: float = 1.0) -> None:
         """Draw new velocity commands for the masked environments, in place.

@@ -71,9 +71,9 @@ class FollowedVelocity:
 
     def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
         """Continue from a `state_dict`."""
+        earlier = {"drift": torch.zeros_like(self.drift)}  # versions that had none
         for name in _STATE:
-            if name in state:  # earlier versions have no drift
-                setattr(self, name, state[name].to(self.error.device, copy=True))
+            setattr(self, name, (earlier | state)[name].to(self.error.device, copy=True))
 
 
 _DRIFT_TIME = 2.0

@@ -412,12 +412,12 @@ class QuadrupedEnv(VecEnv):
         ground, cfg = self.ground, self.cfg.terrain
         if isinstance(ground, BoxGround) and (cfg.turning_share < 1.0 or cfg.ahead_share > 0.0):
             velocity = self.commands.command[:, :3]
-            # What draws nothing changes no other draw.
-            draw = torch.ones(self.num_envs, AHEAD_DRAWS, device=self.device)
+            draw = None  # what draws nothing changes no other draw
             if cfg.ahead_share > 0.0:
-                draw.uniform_(generator=self.generator)
-            fastest = self.commands.largest(self.curriculum.commands)
-            velocity.copy_(suit_commands(velocity, mask & ground.across, cfg, fastest, draw))
+                size = self.num_envs, AHEAD_DRAWS
+                draw = torch.rand(size, generator=self.generator, device=self.device)
+            speeds = self.commands.speeds_ahead(self.curriculum.commands)
+            velocity.copy_(suit_commands(velocity, mask & ground.across, cfg, speeds, draw))
 
     def _resample_and_push(self, dones: torch.Tensor) -> None:
         due = self._due(self._command_steps) & ~dones
@@ -508,9 +508,7 @@ class QuadrupedEnv(VecEnv):
         time = torch.full((self.num_envs,), usual, device=self.device)
         longer, ground = self.cfg.terrain.command_time, self.ground
         if longer > 0.0 and isinstance(ground, BoxGround):
-            has_levels = [name != "flat" for name in ground.kinds]
-            with_levels = torch.tensor(has_levels, device=self.device)[ground.kind]
-            time = torch.where(with_levels, self._steps(longer), time)
+            time = torch.where(ground.has_kind("flat"), time, self._steps(longer))
         return time
 
     def _quiet_share_of_robots(self) -> float | torch.Tensor:
@@ -518,9 +516,7 @@ class QuadrupedEnv(VecEnv):
         share, ground = self.cfg.terrain.quiet_share, self.ground
         if share == 1.0 or not isinstance(ground, BoxGround):
             return 1.0
-        level = [name in QUIET_KINDS for name in ground.kinds]
-        on_level = torch.tensor(level, device=self.device)[ground.kind]
-        return torch.where(on_level, 1.0, share)
+        return torch.where(ground.has_kind(*QUIET_KINDS), 1.0, share)
 
     def _allocate(self) -> None:
         num_envs, device = self.num_envs, self.device

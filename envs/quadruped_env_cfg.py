@@ -78,6 +78,11 @@ class QuadrupedEnvCfg:
                 f"env.engine must be one of {', '.join(get_args(Engine))}, got {self.engine!r}"
             )
         check_ranges(self, "env", _RANGES)
+        if self.terrain.ahead_share > 0.0 and self.commands.lin_vel_x[1] <= 0.0:
+            raise ValueError(
+                "env.commands.lin_vel_x must end above 0 where env.terrain.ahead_share is "
+                f"{self.terrain.ahead_share:g}, got {self.commands.lin_vel_x}"
+            )
         for name, term in self.rewards.terms.items():
             needs = term.function == "landing_load" and term.weight != 0.0
             if needs and not self.scene.foot_forces:

@@ -257,12 +257,12 @@ def _check_model(model: mujoco.MjModel) -> None:
         ValueError: If the model has some of it.
     """
     boxes = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, GROUND_BOX.format(0)) >= 0
-    for there, field in ((boxes, "terrain.kind"), (model.nhistory, "randomization.action_delay")):
+    late = "env.randomization.action_delay and everything_share"
+    for there, fields in ((boxes, "env.terrain.kind"), (model.nhistory, late)):
         if there:
             raise ValueError(
                 f"the engine 'warp' has flat ground and motors that are never late alone: let the"
-                f" physics run on the CPU with env.engine 'mujoco', or leave env.{field} as it is"
-                " by default"
+                f" physics run on the CPU with env.engine 'mujoco', or leave {fields} by default"
             )
 
 

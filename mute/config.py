@@ -274,12 +274,11 @@ class TaskCfg:
                 by, left and right cannot be treated alike, or a heading is to be held unseen.
         """
         num_envs, agent, scales = self.env.num_envs, self.agent, self.env.observations.scales
-        if agent.heading_gain > 0.0 and not (
-            scales["base_ang_vel"] and scales["projected_gravity"]
-        ):
+        seen = ("base_ang_vel", "projected_gravity", "command")
+        if agent.heading_gain > 0.0 and not all(scales[name] for name in seen):
             raise ValueError(
                 "agent.heading_gain must be 0 where env.observations.scales have 0 for "
-                f"base_ang_vel or projected_gravity, got {agent.heading_gain:g}"
+                f"{', '.join(seen)}, got {agent.heading_gain:g}"
             )
         samples = num_envs * agent.num_steps_per_env
         if agent.ppo.num_mini_batches > samples:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from places import REPOSITORY
 from tensordict import TensorDict
 
 from mute.controllers import LearnedController, load_policy
+from mute.envs.observations import OBSERVATION_WIDTHS, slices
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.reliability.conditions import BETAS
 from mute.evaluation.reliability.parts import PARTS
@@ -187,12 +189,15 @@ def test_its_onnx_form_is_the_same_policy(each):
     policy = load_policy(RESOURCES / f"{each}.pt")
     session = onnxruntime.InferenceSession(str(RESOURCES / f"{each}.onnx"))
     controller = LearnedController(policy, 1)
-    size = policy.cfg.agent.estimation.network.lstm_hidden
-    state = {name: np.zeros((1, size), dtype=np.float32) for name in ("h_in", "c_in")}
+    shapes = {node.name: node.shape for node in session.get_inputs()}
+    remembered = json.loads(session.get_modelmeta().custom_metadata_map["recurrent_state"])
+    state = {name: np.zeros(shapes[name], dtype=np.float32) for name in remembered}
     generator = torch.Generator().manual_seed(0)
-    for _ in range(20):
+    for step in range(20):
         obs = 0.3 * torch.randn(1, 46, generator=generator)
+        if step % 5:
+            obs[:, slices(OBSERVATION_WIDTHS)["command"].start + 2] = 0.0  # it is to go straight
         expected = controller.act(TensorDict({"policy": obs}, batch_size=[1]))
-        outputs = session.run(["action", "h_out", "c_out"], {"obs": obs.numpy()} | state)
+        outputs = session.run(["action", *remembered.values()], {"obs": obs.numpy()} | state)
         np.testing.assert_allclose(np.asarray(outputs[0]), expected.numpy(), atol=1e-4)
-        state = {"h_in": outputs[1], "c_in": outputs[2]}
+        state = dict(zip(remembered, outputs[1:], strict=True))

@@ -19,20 +19,31 @@ def suit_commands(
     velocity: torch.Tensor,
     across: torch.Tensor,
     cfg: TerrainCfg,
-    fastest: float,
-    draw: torch.Tensor,
+    speeds: tuple[float, float],
+    draw: torch.Tensor | None,
 ) -> torch.Tensor:
     """Return commands that suit the ground: fewer turns, and more that lead ahead.
+
+    Those ahead take the place of any, of commands to stand as well.
 
     Args:
         velocity: Commands (v_x, v_y, w_z) as they were drawn. Shape: (num_envs, 3).
         across: Robots whose ground is crossed along x; no others' change. Shape: (num_envs,), bool.
         cfg: The ground.
-        fastest: Largest forward speed, m/s.
-        draw: Random numbers in [0, 1). Shape: (num_envs, AHEAD_DRAWS).
+        speeds: Lowest and largest forward speed that may be asked for, m/s; of those ahead, the
+            lowest is at least three tenths of the largest.
+        draw: Random numbers in [0, 1); None where no command leads ahead.
+            Shape: (num_envs, AHEAD_DRAWS).
+
+    Returns:
+        New commands. Shape: (num_envs, 3).
     """
     shares = velocity.new_tensor((1.0, 1.0, cfg.turning_share))
+    suited = torch.where(across[:, None], shares * velocity, velocity)
+    if draw is None:
+        return suited
+    lowest, largest = speeds
+    lowest = max(lowest, _SLOWEST * largest)
     ahead = torch.zeros_like(velocity)
-    ahead[:, 0] = fastest * (_SLOWEST + (1.0 - _SLOWEST) * draw[:, 1])
-    goes_ahead = (draw[:, :1] < cfg.ahead_share) & across[:, None]
-    return torch.where(goes_ahead, ahead, torch.where(across[:, None], shares * velocity, velocity))
+    ahead[:, 0] = lowest + (largest - lowest) * draw[:, 1]
+    return torch.where(across[:, None] & (draw[:, :1] < cfg.ahead_share), ahead, suited)

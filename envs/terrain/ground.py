@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 
@@ -180,8 +180,9 @@ class BoxGround(Ground):
             simulation.field(name)
             for name in ("geom_pos", "geom_size", "geom_quat", "geom_aabb", "geom_rbound")
         )
-        self._quat[:, self._boxes] = 0.0
-        self._quat[:, self._boxes, 0] = 1.0
+        fields = (self._pos, self._size, self._aabb, self._rbound)
+        self._away = [field[0, self._boxes].clone() for field in fields]
+        self._put_away()
 
     def height(self, points: torch.Tensor, robots: torch.Tensor | None = None) -> torch.Tensor:
         """Return the ground height at world points, m, see `Ground.height`."""
@@ -221,16 +222,37 @@ class BoxGround(Ground):
             if KINDS[name].boxes and len(chosen):
                 self._lay(KINDS[name], chosen, xy[chosen])
 
-    def state_dict(self) -> dict[str, torch.Tensor]:
-        """Return all that is needed to continue bit for bit; the boxes are the simulation's."""
-        return {"level": self.level.clone(), "key": self.key.clone(), "cell": self._cell.clone()}
+    def has_kind(self, *names: str) -> torch.Tensor:
+        """Return which robots have ground of these kinds. Shape: (num_envs,), bool."""
+        among = [name in names for name in self.kinds]
+        return torch.tensor(among, device=self.kind.device)[self.kind]
 
-    def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
-        """Continue from a `state_dict`, where the simulation does so as well."""
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that is needed to continue bit for bit; the boxes are the simulation's."""
+        parts = {name: getattr(self, name).clone() for name in ("kind", "level", "key")}
+        return {"kinds": list(self.kinds), "cell": self._cell.clone(), **parts}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Continue from a `state_dict`, where the simulation does so as well.
+
+        Raises:
+            ValueError: If robots had ground of other kinds.
+        """
         device = self.level.device
         self.level = state["level"].to(device, copy=True)
         self.key = state["key"].to(device, copy=True)
         self._cell = state["cell"].to(device, copy=True)
+        if "kinds" not in state:
+            # Of an earlier version, whose choices may have had other shares: boxes are laid anew.
+            self._cell.fill_(torch.inf)
+            self._put_away()
+        elif tuple(state["kinds"]) != self.kinds or not torch.equal(
+            state["kind"].to(device), self.kind
+        ):
+            raise ValueError(
+                f"its robots had ground of the kinds {', '.join(state['kinds'])} in other shares or"
+                f" another order than now: {', '.join(self.kinds)}"
+            )
 
     def drawn(self, robot: int, xy: torch.Tensor) -> tuple[Layout, float]:
         """Return the boxes of a robot's ground as far as one looks, and the height of its plane.
@@ -242,6 +264,14 @@ class BoxGround(Ground):
         kind = KINDS[self.kinds[int(self.kind[robot])]]
         level, key = self.level[robot, None].cpu(), self.key[robot, None].cpu()
         return kind.lay(xy.cpu()[None], level, key, wide=True), float(kind.base(level))
+
+    def _put_away(self) -> None:
+        """Leave every box as the model has it, away from the robots and not turned."""
+        fields = (self._pos, self._size, self._aabb, self._rbound)
+        for field, away in zip(fields, self._away, strict=True):
+            field[:, self._boxes] = away
+        self._quat[:, self._boxes] = 0.0
+        self._quat[:, self._boxes, 0] = 1.0
 
     def _lay(self, kind: Kind, robots: torch.Tensor, xy: torch.Tensor) -> None:
         level, dtype = self.level[robots], self._pos.dtype

@@ -93,7 +93,8 @@ def next_levels(
         unit: Random numbers in [0, 1), for those who have solved them all. Shape: (n,).
     """
     far = travelled.away > crossed
-    up = far & ~fallen & (travelled.made >= passed_share * travelled.asked)
+    made = travelled.made.clamp(min=0.0)  # a share of 0 asks for nothing of who was pushed back
+    up = far & ~fallen & (made >= passed_share * travelled.asked)
     down = ~far & (fallen | (travelled.made < 0.5 * travelled.asked))
     changed = level + up.long() - down.long()
     anywhere = (unit * LEVELS).long()

@@ -45,8 +45,12 @@ class HeadingHold:
         It is the vertical part of the angular velocity that counts: a trunk on stairs is tilted.
 
         Args:
-            obs: The group `policy`. Shape: (num_envs, OBS_DIM).
+            obs: The group `policy`, scaled. Shape: (num_envs, OBS_DIM).
             turned: The angle to the left, rad; 0 to begin with. Shape: (num_envs, 1).
+
+        Returns:
+            The group, scaled as before, with another yaw rate, and the angle. Shapes:
+            (num_envs, OBS_DIM) and (num_envs, 1).
         """
         rate = (obs[:, _ANG_VEL] * obs[:, _GRAVITY]).sum(dim=1, keepdim=True)
         rate = rate * (-1.0 / (self.ang_vel_scale * self.gravity_scale))

@@ -134,13 +134,20 @@ def test_the_page_tells_the_figures_of_the_recipe_indoors():
     assert lowest == highest
     made = f"makes {ground.passed_share:.0%}".replace("%", " %")
     assert f"Levels begin at {lowest}; who gets {ground.crossed:g} m away, and {made} of" in told
-    assert f"{ground.ahead_share:.0%} of the commands lead".replace("%", " %") in told
+    assert (
+        f"{ground.ahead_share:.0%} of the commands lead straight ahead, at 0.3 m/s".replace(
+            "%", " %"
+        )
+        in told
+    )
     differs = env.randomization.everything_share
     assert f"- {differs:.0%} of the robots differ in everything".replace("%", " %") in told
     assert f"Of what beta scales, {ground.quiet_share:.0%} is left".replace("%", " %") in told
     share = {5.0: "a fifth"}[1.0 / ground.turning_share]
-    assert f"a velocity command lasts {ground.command_time:g} s and turns {share} as fast" in told
-    assert f"as commands of {_CFG.env.commands.resampling_time:g} s cross nothing" in told
+    short = _CFG.env.commands.resampling_time
+    lasts = f"lasts {ground.command_time:g} s, as commands of {short:g} s cross nothing"
+    assert f"a velocity command {lasts}" in told
+    assert f"commands turn {share} as fast" in told
     ours, flat = env.rewards.terms.keys(), _CFG.env.rewards.terms.keys()
     assert flat - ours == {"tilt"} and "`lean` in place of `tilt`" in told
     assert ours - flat == {"lean", "progress", "yaw_drift"}

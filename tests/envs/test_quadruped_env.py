@@ -583,6 +583,9 @@ def test_the_drift_of_the_heading_is_averaged_over_two_seconds():
     env.followed.reset(torch.ones(2, dtype=torch.bool))
     env.followed.load_state_dict(kept)
     torch.testing.assert_close(env.followed.drift, drift)
+    del kept["drift"]  # as in versions that had none
+    env.followed.load_state_dict(kept)
+    assert not env.followed.drift.any()
 
 
 def test_what_is_followed_goes_from_command_to_command_with_the_acceleration_that_is_asked_for():

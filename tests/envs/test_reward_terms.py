@@ -60,8 +60,12 @@ CASES = {
         [0.5**2, 0.4**2],
     ),
     "progress": (
-        {"command": [[0.3, 0.4], [0.5]], "velocity_error": [[0.3, 0.0], [1.2, 0.3]]},
-        [1.0 - 0.09 / 0.25, -1.0],  # what is missing along it; backwards, but no more than once
+        {
+            "command": [[0.3, 0.4], [0.5], [0.0, 0.0, 0.5, 1.0]],
+            "velocity_error": [[0.3, 0.0], [1.2, 0.3], [0.2]],
+        },
+        # What is missing along it; backwards, but no more than once; asked to go nowhere.
+        [1.0 - 0.09 / 0.25, -1.0, 0.0],
     ),
     "yaw_drift": ({"yaw_drift": [-0.1, 0.5]}, [0.1, 0.3]),
     "lin_vel_z": ({"base_lin_vel": [[9.0, 9.0, -0.5], [0, 0, 2.0]]}, [0.25, 4.0]),

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
+import { buildGraph } from "../src/policy/graph.js";
 import { readOnnx } from "../src/policy/onnx_file.js";
 import { Policy, PolicyError } from "../src/policy/policy.js";
 import { fields } from "../src/policy/protobuf.js";
@@ -117,6 +118,31 @@ test("gains, scales and limits that no robot has are refused, each in one line",
   const scales = { base_ang_vel: 1e9, projected_gravity: 1, joint_pos: 1 };
   const all = JSON.stringify({ ...scales, joint_vel: 0.05, last_action: 1, command: 1 });
   assert.match(refusal(withMetadata("observation_scales", all)), /observation_scales must be from/);
+});
+
+test("numbers are held between two bounds, and bounds that are none are refused", () => {
+  const number = (value: number) => ({ shape: [1], data: Float32Array.of(value) });
+  const graph = (...inputs: string[]) =>
+    buildGraph(
+      {
+        nodes: [{ operator: "Clip", inputs, outputs: ["y"], attributes: new Map() }],
+        constants: new Map([
+          ["low", number(-0.5)],
+          ["high", number(2)],
+        ]),
+        inputs: new Map([["x", [1, 4]]]),
+        outputs: ["y"],
+        metadata: new Map(),
+      },
+      0.02,
+    );
+  const held = graph("x", "low", "high");
+  held.inputs.get("x")?.set([-3, -0.5, 1.25, 7]);
+  held.run();
+  assert.deepEqual([...(held.outputs.get("y") ?? [])], [-0.5, -0.5, 1.25, 2]);
+  for (const inputs of [["x", "low"], ["x", "x", "high"], ["x"]]) {
+    assert.throws(() => graph(...inputs), /a Clip is of a form that is not known here/);
+  }
 });
 
 test("a policy that would take too long for a control step is refused, one with some more to do is not", () => {

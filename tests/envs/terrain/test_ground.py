@@ -192,6 +192,27 @@ def test_a_walk_over_ground_goes_on_bit_for_bit(kind):
     assert torch.equal(_ground(one).key, _ground(other).key)
 
 
+def test_a_state_of_an_earlier_version_goes_on_upon_ground_that_is_laid_anew():
+    one, other = (_env("indoor", 12, episode_length=0.3, seed=seed) for seed in (1, 2))
+    _walk(one, 10, torch.Generator().manual_seed(0))
+    state = one.state_dict()
+    for name in ("kinds", "kind"):
+        del state["ground"][name]
+    other.load_state_dict(state)
+    other.step(torch.zeros(12, 12))
+    ground, fields = _ground(other), ("geom_pos", "geom_size", "geom_quat")
+    laid = [other.simulation.field(name).clone() for name in fields]
+    ground.lay(other.simulation.qpos[:, :2], torch.ones(12, dtype=torch.bool))
+    for name, before in zip(fields, laid, strict=True):
+        torch.testing.assert_close(other.simulation.field(name), before)
+
+
+def test_robots_that_had_other_kinds_of_ground_do_not_go_on():
+    one, other = _env("indoor", 6), _env("rough", 6)
+    with pytest.raises(ValueError, match=r"ground of the kinds .* than now: "):
+        _ground(other).load_state_dict(_ground(one).state_dict())
+
+
 def test_heights_around_a_robot_are_those_of_its_ground():
     env = _env("stairs", 5)
     _ground(env).level = torch.arange(5)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 import torch
 
@@ -45,6 +47,7 @@ def _next(
         (2, 1.0, 1.0, 1.0, True, 1),  # did all that it was asked for until it fell
         (0, 0.0, 0.0, 8.0, True, 0),
         (1, 2.0, -2.0, 3.0, False, 0),
+        (2, 5.0, -1.0, 0.0, False, 3),  # pushed away
     ],
 )
 def test_a_robot_goes_up_where_it_crossed_and_down_where_it_fell_or_made_less_than_half(
@@ -180,10 +183,20 @@ def test_some_commands_lead_ahead_where_ground_is_crossed_along_x_if_they_are_to
     across = torch.tensor([True, True, True, False])
     draw = torch.tensor([[0.4, 0.0], [0.4, 0.5], [0.6, 0.5], [0.4, 0.5]])
     cfg = TerrainCfg(ahead_share=0.5, turning_share=0.25)
-    suited = suit_commands(velocity, across, cfg, 2.0, draw)
+    suited = suit_commands(velocity, across, cfg, (-1.0, 2.0), draw)
     # Ahead at 0.3 and at 0.65 of the largest speed; one of the others; on other ground.
     expected = [[0.6, 0.0, 0.0], [1.3, 0.0, 0.0], [-0.5, 0.2, 0.1], [-0.5, 0.2, 0.4]]
     torch.testing.assert_close(suited, torch.tensor(expected))
+
+
+def test_no_command_ahead_is_slower_than_any_may_be():
+    commands = CommandsCfg(lin_vel_x=(0.5, 1.0), initial_share=0.8, ramp=(0.0, 1e6))
+    ground = TerrainCfg(kind="stairs", ahead_share=1.0)
+    cfg = QuadrupedEnvCfg(num_envs=40, num_threads=1, terrain=ground, commands=commands)
+    ahead = QuadrupedEnv(cfg).commands.command[:, 0]
+    assert 0.4 <= float(ahead.min()) < 0.45 and 0.75 < float(ahead.max()) <= 0.8
+    with pytest.raises(ValueError, match=r"env\.commands\.lin_vel_x must end above 0"):
+        dataclasses.replace(cfg, commands=CommandsCfg(lin_vel_x=(-1.0, -0.2)))
 
 
 def test_commands_ahead_grow_with_the_ranges():

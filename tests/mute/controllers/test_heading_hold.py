@@ -11,6 +11,7 @@ import torch
 from mute.config import TaskCfg
 from mute.controllers import LearnedController, load_policy
 from mute.controllers.heading_hold import HeadingHold, heading_hold
+from mute.controllers.learned import Policy
 from mute.envs.observations import OBSERVATION_WIDTHS, policy_observation, slices
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.randomization import RandomizationCfg
@@ -82,19 +83,37 @@ def test_a_task_without_a_gain_holds_no_heading():
     assert heading_hold(TaskCfg()) is None
 
 
-def test_a_heading_that_is_not_seen_cannot_be_held():
+@pytest.mark.parametrize("name", ["base_ang_vel", "projected_gravity", "command"])
+def test_a_heading_that_is_not_seen_cannot_be_held(name):
     cfg = TaskCfg()
-    unseen = dataclasses.replace(cfg.env.observations, scales=_SCALES | {"projected_gravity": 0.0})
+    unseen = dataclasses.replace(cfg.env.observations, scales=_SCALES | {name: 0.0})
     env = dataclasses.replace(cfg.env, observations=unseen)
     with pytest.raises(ValueError, match=r"agent\.heading_gain must be 0 where"):
         TaskCfg(env=env, agent=dataclasses.replace(cfg.agent, heading_gain=1.0))
 
 
-def _headings_off(gain: float) -> torch.Tensor:
-    """Return how far robots that differ have turned after 8 s ahead, rad."""
+def test_it_takes_left_and_right_alike():
+    side = torch.tensor([1.0, -1.0])[:, None]
+    ang_vel, gravity = torch.tensor([0.3, -0.2, 0.5]), torch.tensor([0.2, 0.1, -0.97])
+    seen = _seen((0.5, 0.0, 0.0, 0.0)).repeat(2, 1)
+    seen[:, _PARTS["base_ang_vel"]] = ang_vel * torch.cat((side, side**2, side), dim=1)
+    seen[:, _PARTS["projected_gravity"]] = gravity * torch.cat((side**2, side, side**2), dim=1)
+    obs, turned = _HOLD.step(seen, 0.1 * side)
+    torch.testing.assert_close(turned[0], -turned[1])
+    yaw = obs[:, _PARTS["command"]][:, 2]
+    assert yaw[0].item() == pytest.approx(-yaw[1].item())
+    assert abs(yaw[0].item()) > 0.1
+
+
+def _flat_policy(gain: float) -> Policy:
     policy = load_policy(RESOURCES / "go1" / "go1_mute_flat.pt")
     agent = dataclasses.replace(policy.cfg.agent, heading_gain=gain)
-    policy = dataclasses.replace(policy, cfg=dataclasses.replace(policy.cfg, agent=agent))
+    return dataclasses.replace(policy, cfg=dataclasses.replace(policy.cfg, agent=agent))
+
+
+def _headings_off(gain: float) -> torch.Tensor:
+    """Return how far robots that differ have turned after 8 s ahead, rad."""
+    policy = _flat_policy(gain)
     robots = RandomizationCfg(push_interval=0.0, encoder_offset=(-0.02, 0.02))
     env = dataclasses.replace(policy.cfg.env, randomization=robots, random_heading=False)
     env = QuadrupedEnv(evaluation_cfg(env, 16, 9.0, 0, randomized=True))
@@ -112,9 +131,7 @@ def test_robots_that_differ_go_straight_with_it():
 
 
 def test_who_begins_anew_has_not_turned():
-    policy = load_policy(RESOURCES / "go1" / "go1_mute_flat.pt")
-    agent = dataclasses.replace(policy.cfg.agent, heading_gain=2.0)
-    policy = dataclasses.replace(policy, cfg=dataclasses.replace(policy.cfg, agent=agent))
+    policy = _flat_policy(2.0)
     seen = _seen((0.5, 0.0, 0.0, 0.0), ang_vel=(0.0, 0.0, 1.0)).repeat(2, 1)
     one, new = LearnedController(policy, 2), LearnedController(policy, 2)
     first = new.act({"policy": seen})  # pyright: ignore[reportArgumentType]
