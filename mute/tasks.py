@@ -72,7 +72,7 @@ def _go1_mute() -> TaskCfg:
     # Most robots are on ground that leaves little of these: they make up for it on level ground.
     for term in terms.values():
         if term.group == "phase":
-            term.weight *= 1.4
+            term.weight = round(1.4 * term.weight, 6)
     env = dataclasses.replace(
         task.env,
         # Ground is learnt aloud: with the times of flat ground, robots climb no stairs.
