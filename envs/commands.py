@@ -117,6 +117,14 @@ class CommandSampler:
         """Which environments are asked to stand still. Shape: (num_envs,)."""
         return (self.command[:, :BETA] == 0.0).all(dim=1)
 
+    def largest(self, progress: float = 1.0) -> float:
+        """Return the largest forward speed that is asked for, m/s.
+
+        Args:
+            progress: How far the ranges have grown, see `resample`.
+        """
+        return self.cfg.lin_vel_x[1] * self._grown(progress)
+
     def resample(self, mask: torch.Tensor, with_beta: bool, progress: float = 1.0) -> None:
         """Draw new velocity commands for the masked environments, in place.
 
@@ -133,7 +141,7 @@ class CommandSampler:
             draw[:, BETA] = _to_ends(draw[:, BETA], cfg.beta_end_fraction)
         fresh = self._low + self._span * draw[:, :4]
         velocity = fresh[:, :BETA]
-        velocity *= cfg.initial_share + (1.0 - cfg.initial_share) * progress
+        velocity *= self._grown(progress)
         if shaped:
             self._shape(velocity, draw[:, 5:])
         standing = draw[:, 4] < cfg.standing_fraction
@@ -143,6 +151,10 @@ class CommandSampler:
         if not with_beta:
             fresh[:, BETA] = self.command[:, BETA]
         torch.where(mask.unsqueeze(1), fresh, self.command, out=self.command)
+
+    def _grown(self, progress: float) -> float:
+        """Return the share of the ranges that commands are drawn from by now."""
+        return self.cfg.initial_share + (1.0 - self.cfg.initial_share) * progress
 
     def _shape(self, velocity: torch.Tensor, draw: torch.Tensor) -> None:
         """Slow some of the commands down and leave some a single axis, in place.

@@ -14,7 +14,8 @@ __all__ = ["FollowedVelocity"]
 class FollowedVelocity:
     """The velocity that the following terms ask for, and the mean of what is missing to it.
 
-    Both are (v_x, v_y, w_z) in the body frame, in m/s and rad/s. Shapes: (num_envs, 3).
+    Both are (v_x, v_y, w_z) in the body frame, in m/s and rad/s. Shapes: (num_envs, 3). What is
+    missing to the yaw rate is averaged over a longer time as well.
     """
 
     def __init__(
@@ -31,10 +32,13 @@ class FollowedVelocity:
         acceleration, time = cfg.following_acceleration, cfg.following_time
         self._step = acceleration * step_dt if acceleration else math.inf
         self._share = -math.expm1(-step_dt / time) if time else 1.0
+        self._drift_share = -math.expm1(-step_dt / _DRIFT_TIME)
         self.reference = torch.zeros(num_envs, 3, device=device)
         """The command, or what lies on the way to it where the acceleration is bounded."""
         self.error = torch.zeros(num_envs, 3, device=device)
         """What is missing to it, an exponential average over `RewardsCfg.following_time`."""
+        self.drift = torch.zeros(num_envs, device=device)
+        """What is missing to its yaw rate, an average over 2 s, rad/s. Shape: (num_envs,)."""
 
     def update(
         self, command: torch.Tensor, base_lin_vel: torch.Tensor, base_ang_vel: torch.Tensor
@@ -49,7 +53,9 @@ class FollowedVelocity:
         change = (command[:, :3] - self.reference).clamp(-self._step, self._step)
         self.reference = self.reference + change
         velocity = torch.cat((base_lin_vel[:, :2], base_ang_vel[:, 2:]), dim=1)
-        self.error = self.error.lerp(self.reference - velocity, self._share)
+        missing = self.reference - velocity
+        self.error = self.error.lerp(missing, self._share)
+        self.drift = self.drift.lerp(missing[:, 2], self._drift_share)
         return self.error
 
     def reset(self, mask: torch.Tensor) -> None:
@@ -57,12 +63,20 @@ class FollowedVelocity:
         column = mask.unsqueeze(1)
         self.reference = self.reference.masked_fill(column, 0.0)
         self.error = self.error.masked_fill(column, 0.0)
+        self.drift = self.drift.masked_fill(mask, 0.0)
 
     def state_dict(self) -> dict[str, torch.Tensor]:
         """Return all that is needed to continue bit for bit."""
-        return {"reference": self.reference.clone(), "error": self.error.clone()}
+        return {name: getattr(self, name).clone() for name in _STATE}
 
     def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
         """Continue from a `state_dict`."""
-        self.reference = state["reference"].to(self.reference.device, copy=True)
-        self.error = state["error"].to(self.error.device, copy=True)
+        for name in _STATE:
+            if name in state:  # earlier versions have no drift
+                setattr(self, name, state[name].to(self.error.device, copy=True))
+
+
+_DRIFT_TIME = 2.0
+"""Some strides long, s: what is left then is where the robot turns to."""
+
+_STATE = ("reference", "error", "drift")

@@ -22,6 +22,8 @@ class Motion:
     velocity_error: torch.Tensor
     """What is missing to the (v_x, v_y, w_z) that the following terms ask for, averaged over
     `RewardsCfg.following_time`. Shape: (num_envs, 3)."""
+    yaw_drift: torch.Tensor
+    """What is missing to the yaw rate, averaged over 2 s. Shape: (num_envs,)."""
     projected_gravity: torch.Tensor
     """Direction of gravity in the body frame. Shape: (num_envs, 3)."""
     base_height: torch.Tensor

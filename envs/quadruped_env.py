@@ -36,7 +36,8 @@ from .rewards import Motion, RewardSum
 from .scene import FOOT_RADIUS, LEGS, STAND_JOINT_POS, SceneCfg, build_scene
 from .sensors import RobotSensors
 from .step_log import curriculum_log, episode_log, gait_log, ground_log
-from .terrain import BoxGround, FlatGround, Ground, kind_of_robot, num_boxes
+from .terrain import QUIET_KINDS, BoxGround, FlatGround, Ground, kind_of_robot, num_boxes
+from .terrain.commands import AHEAD_DRAWS, suit_commands
 from .terrain.draws import KEYS
 from .terrain.levels import Travelled, next_levels
 from .terrain.slope import slope_under
@@ -104,6 +105,7 @@ class QuadrupedEnv(VecEnv):
         self.ground = self._make_ground()
         """The ground under the robots."""
         self._command_steps = self._steps_of_commands()
+        self._quiet_share = self._quiet_share_of_robots()
         self.travelled = Travelled(cfg.num_envs, self.device)
         if isinstance(self.ground, BoxGround):
             self.travelled.across = self.ground.across
@@ -155,7 +157,8 @@ class QuadrupedEnv(VecEnv):
         self.fallen = self._falls()
         factors = self.curriculum
         motion = self._motion(phase)
-        reward, shares = self.reward_sum(motion, factors.quiet, factors.lift, factors.guide)
+        quiet = factors.quiet * self._quiet_share
+        reward, shares = self.reward_sum(motion, quiet, factors.lift, factors.guide)
         # What an unstable simulation did is neither the policy's merit nor its fault: it gains
         # nothing in this step, and is worth from then on what its last observation promised.
         reward = torch.where(self.unstable, 0.0, reward)
@@ -326,6 +329,7 @@ class QuadrupedEnv(VecEnv):
             velocity_error=self.followed.update(
                 self.commands.command, self.base_lin_vel, self.base_ang_vel
             ),
+            yaw_drift=self.followed.drift,
             projected_gravity=self.projected_gravity,
             base_height=self.base_pos[:, 2] - ground.trunk,
             joint_pos=self.joint_pos,
@@ -395,7 +399,9 @@ class QuadrupedEnv(VecEnv):
             return
         unit = torch.rand(2, self.num_envs, generator=self.generator, device=self.device)
         if cfg.curriculum and self.step_count:
-            levels = next_levels(ground.level, self.travelled, self.fallen, cfg.crossed, unit[0])
+            levels = next_levels(
+                ground.level, self.travelled, self.fallen, cfg.crossed, cfg.passed_share, unit[0]
+            )
             ground.level = torch.where(mask, levels, ground.level)
         ground.key = torch.where(mask, (unit[1] * KEYS).long(), ground.key)
         ground.lay(self.simulation.qpos[:, :2], mask)
@@ -403,10 +409,15 @@ class QuadrupedEnv(VecEnv):
     def _command(self, mask: torch.Tensor, with_beta: bool) -> None:
         """Draw new commands for the masked robots, with beta where an episode begins."""
         self.commands.resample(mask, with_beta, self.curriculum.commands)
-        share = self.cfg.terrain.turning_share
-        if share < 1.0 and isinstance(self.ground, BoxGround):
-            straight = mask & self.ground.across
-            self.commands.command[:, 2] *= torch.where(straight, share, 1.0)
+        ground, cfg = self.ground, self.cfg.terrain
+        if isinstance(ground, BoxGround) and (cfg.turning_share < 1.0 or cfg.ahead_share > 0.0):
+            velocity = self.commands.command[:, :3]
+            # What draws nothing changes no other draw.
+            draw = torch.ones(self.num_envs, AHEAD_DRAWS, device=self.device)
+            if cfg.ahead_share > 0.0:
+                draw.uniform_(generator=self.generator)
+            fastest = self.commands.largest(self.curriculum.commands)
+            velocity.copy_(suit_commands(velocity, mask & ground.across, cfg, fastest, draw))
 
     def _resample_and_push(self, dones: torch.Tensor) -> None:
         due = self._due(self._command_steps) & ~dones
@@ -502,6 +513,15 @@ class QuadrupedEnv(VecEnv):
             time = torch.where(with_levels, self._steps(longer), time)
         return time
 
+    def _quiet_share_of_robots(self) -> float | torch.Tensor:
+        """Return what each robot's ground leaves of the phase rewards' weight."""
+        share, ground = self.cfg.terrain.quiet_share, self.ground
+        if share == 1.0 or not isinstance(ground, BoxGround):
+            return 1.0
+        level = [name in QUIET_KINDS for name in ground.kinds]
+        on_level = torch.tensor(level, device=self.device)[ground.kind]
+        return torch.where(on_level, 1.0, share)
+
     def _allocate(self) -> None:
         num_envs, device = self.num_envs, self.device
         zeros = torch.zeros(num_envs, NUM_ACTIONS, device=device)
@@ -524,7 +544,7 @@ class QuadrupedEnv(VecEnv):
 def scene_of(cfg: QuadrupedEnvCfg) -> SceneCfg:
     """Return a task's scene, with the boxes that its ground takes and the delays of its motors."""
     scene, robots = cfg.scene, cfg.randomization
-    longest_delay = robots.action_delay[1] if robots.enabled else 0.0
+    longest_delay = robots.hull("action_delay")[1] if robots.enabled else 0.0
     return dataclasses.replace(
         scene,
         ground_boxes=max(scene.ground_boxes, num_boxes(cfg.terrain.shares)),

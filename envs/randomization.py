@@ -6,6 +6,8 @@ stay a thousand robots for a whole training.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,6 +59,9 @@ class RandomizationCfg:
     drawn for each joint."""
     imu_tilt: tuple[float, float] = (0.0, 0.0)
     """Turn of the inertial sensor against the trunk, about each axis, rad."""
+    everything_share: float = 0.0
+    """Share of the robots that are drawn from the ranges of `full_randomization` instead: they
+    differ in everything, and the others learn to walk meanwhile."""
     push_interval: float = 8.0
     """Time between pushes, s; 0 for none."""
     push_velocity: float = 0.4
@@ -69,8 +74,15 @@ class RandomizationCfg:
             ValueError: If a range is empty, or a number is out of its own.
         """
         check_ranges(self, "env.randomization", _RANGES)
-        pairs = [name for name in _RANGES if not name.startswith("push_")]
-        check_ordered(self, "env.randomization", *pairs)
+        check_ordered(self, "env.randomization", *_DRAWN)
+
+    def hull(self, name: str) -> tuple[float, float]:
+        """Return the range of a field over all robots, those that differ in everything as well."""
+        low, high = getattr(self, name)
+        if self.everything_share == 0.0:
+            return low, high
+        other_low, other_high = getattr(full_randomization(), name)
+        return min(low, other_low), max(high, other_high)
 
 
 def full_randomization(push_interval: float = 4.0) -> RandomizationCfg:
@@ -112,10 +124,24 @@ _RANGES = {
     "action_delay": Range(0.0, 1.0),
     "encoder_offset": Range(-1.0, 1.0),
     "imu_tilt": Range(-1.0, 1.0),
+    "everything_share": Range(0.0, 1.0),
     "push_interval": Range(0.0, 1e12),
     "push_velocity": Range(0.0, 100.0),
 }
 
+_DRAWN = (
+    "friction_factor",
+    "added_mass",
+    "com_offset",
+    "gain_scale",
+    "friction_loss",
+    "motor_strength",
+    "armature",
+    "floor_stiffness",
+    "action_delay",
+    "encoder_offset",
+    "imu_tilt",
+)
 
 KNOWN = ("friction_factor", "added_mass", "com_offset", "motor_strength", "action_delay")
 """What the critic knows of a robot's physics, in that order; the offset has three parts."""
@@ -155,53 +181,79 @@ def randomize_physics(
     if not cfg.enabled:
         return RobotPhysics(torch.zeros(num_envs, PHYSICS_DIM, device=device), exact, None)
 
-    def draw(bounds: tuple[float, float], *shape: int) -> torch.Tensor:
+    bounds_of = _bounds(cfg, num_envs, device)
+
+    def draw(name: str, size: int) -> torch.Tensor:
         unit = torch.rand(
-            num_envs, *shape, generator=generator, dtype=torch.float64, device=simulation.device
+            num_envs, size, generator=generator, dtype=torch.float64, device=simulation.device
         )
-        return bounds[0] + (bounds[1] - bounds[0]) * unit
+        low, high = bounds_of(name)
+        return low + (high - low) * unit
 
-    def draw_if(bounds: tuple[float, float], neutral: float, *shape: int) -> torch.Tensor:
-        if bounds == (neutral, neutral):
-            return torch.full((num_envs, *shape), neutral, dtype=torch.float64, device=device)
-        return draw(bounds, *shape)
+    def draw_if(name: str, neutral: float, size: int) -> torch.Tensor:
+        if cfg.hull(name) == (neutral, neutral):
+            return torch.full((num_envs, size), neutral, dtype=torch.float64, device=device)
+        return draw(name, size)
 
-    friction = draw(cfg.friction_factor, 1)
+    friction = draw("friction_factor", 1)
     # The floor has priority and decides; the other geoms are written for whatever meets them.
     simulation.field("geom_friction")[:, :, 0] *= friction
     trunk = model.body("trunk").id
-    added_mass = draw(cfg.added_mass, 1)
+    added_mass = draw("added_mass", 1)
     ratio = (model.body_mass[trunk] + added_mass) / model.body_mass[trunk]
     simulation.field("body_mass")[:, trunk] *= ratio[:, 0]
     simulation.field("body_inertia")[:, trunk] *= ratio
-    com_offset = draw(cfg.com_offset, 3)
+    com_offset = draw("com_offset", 3)
     simulation.field("body_ipos")[:, trunk] += com_offset
-    _randomize_gains(simulation, draw(cfg.gain_scale, model.nu), draw(cfg.gain_scale, model.nu))
-    simulation.field("dof_frictionloss")[:, 6:] = draw(cfg.friction_loss, model.nv - 6)
-    strength = draw_if(cfg.motor_strength, 1.0, 1)
+    _randomize_gains(simulation, draw("gain_scale", model.nu), draw("gain_scale", model.nu))
+    simulation.field("dof_frictionloss")[:, 6:] = draw("friction_loss", model.nv - 6)
+    strength = draw_if("motor_strength", 1.0, 1)
     _randomize_gains(simulation, strength, strength)
     simulation.field("actuator_forcerange")[:] *= strength[:, :, None]
-    simulation.field("dof_armature")[:, 6:] *= draw_if(cfg.armature, 1.0, model.nv - 6)
-    if cfg.floor_stiffness != (1.0, 1.0):
-        _soften_floor(simulation, draw(cfg.floor_stiffness, 1))
-    delay = draw_if(cfg.action_delay, 0.0, 1)
-    if cfg.action_delay[1] > 0.0:
+    simulation.field("dof_armature")[:, 6:] *= draw_if("armature", 1.0, model.nv - 6)
+    if cfg.hull("floor_stiffness") != (1.0, 1.0):
+        _soften_floor(simulation, draw("floor_stiffness", 1))
+    delay = draw_if("action_delay", 0.0, 1)
+    if cfg.hull("action_delay")[1] > 0.0:
         simulation.field("actuator_delay")[:] = delay
-    offset = draw_if(cfg.encoder_offset, 0.0, model.nu)
-    turns = draw_if(cfg.imu_tilt, 0.0, 3)
+    offset = draw_if("encoder_offset", 0.0, model.nu)
+    turns = draw_if("imu_tilt", 0.0, 3)
     simulation.set_const()
     known = torch.cat(
         (
-            _unit(friction, cfg.friction_factor),
-            _unit(added_mass, cfg.added_mass),
-            _unit(com_offset, cfg.com_offset),
-            _unit(strength, cfg.motor_strength),
-            _unit(delay, cfg.action_delay),
+            _unit(friction, cfg.hull("friction_factor")),
+            _unit(added_mass, cfg.hull("added_mass")),
+            _unit(com_offset, cfg.hull("com_offset")),
+            _unit(strength, cfg.hull("motor_strength")),
+            _unit(delay, cfg.hull("action_delay")),
         ),
         dim=1,
     )
-    turned = cfg.imu_tilt != (0.0, 0.0)
+    turned = cfg.hull("imu_tilt") != (0.0, 0.0)
     return RobotPhysics(known.float(), offset.float(), _rotation(turns) if turned else None)
+
+
+_Bounds = Callable[[str], tuple[float | torch.Tensor, float | torch.Tensor]]
+
+
+def _bounds(cfg: RandomizationCfg, num_envs: int, device: torch.device) -> _Bounds:
+    """Return what tells the lowest and the highest value of a field: of all, or (num_envs, 1)."""
+    if cfg.everything_share == 0.0:
+        return lambda name: getattr(cfg, name)
+    everything = full_randomization()
+    # Robot k by the place k sqrt(2), modulo 1: as many as the share says, and of every kind of
+    # ground, whose places the golden ratio gives.
+    robots = torch.arange(num_envs, dtype=torch.float64, device=device)
+    differs = ((robots + 0.5) * math.sqrt(2.0) % 1.0 < cfg.everything_share)[:, None].double()
+
+    def bounds(name: str) -> tuple[torch.Tensor, torch.Tensor]:
+        own, other = getattr(cfg, name), getattr(everything, name)
+        return (
+            own[0] + (other[0] - own[0]) * differs,
+            own[1] + (other[1] - own[1]) * differs,
+        )
+
+    return bounds
 
 
 def _soften_floor(simulation: Simulation, stiffness: torch.Tensor) -> None:

@@ -206,13 +206,13 @@ class RewardSum:
         self._step_dt = step_dt
 
     def __call__(
-        self, motion: Motion, quiet: float, lift: float, guide: float
+        self, motion: Motion, quiet: float | torch.Tensor, lift: float, guide: float
     ) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
         """Return the reward of a control step and each term's share of it.
 
         Args:
             motion: The control step.
-            quiet: Curriculum factor in [0, 1] on the phase group.
+            quiet: Factor in [0, 1] on the phase group: of all, or of each robot, (num_envs,).
             lift: Curriculum factor in [0, 1] on the lift group.
             guide: Curriculum factor in [0, 1] on the guide group.
 

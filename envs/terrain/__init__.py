@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from .cfg import GROUNDS, TerrainCfg, kind_of_robot
+from .cfg import GROUNDS, QUIET_KINDS, TerrainCfg, kind_of_robot
 from .ground import BoxGround, FlatGround, Ground, num_boxes
 from .kinds import KINDS
 
 __all__ = [
     "GROUNDS",
     "KINDS",
+    "QUIET_KINDS",
     "BoxGround",
     "FlatGround",
     "Ground",

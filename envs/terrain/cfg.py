@@ -10,10 +10,10 @@ from mute.support.ranges import Range, check_ordered, check_ranges
 from .figures import LEVELS
 from .kinds import KINDS
 
-__all__ = ["GROUNDS", "TerrainCfg", "kind_of_robot"]
+__all__ = ["GROUNDS", "QUIET_KINDS", "TerrainCfg", "kind_of_robot"]
 
 GROUNDS: Mapping[str, Mapping[str, float]] = {
-    "indoor": {"flat": 0.25, "rooms": 0.25, "blocks": 0.15, "stairs": 0.2, "stairs_down": 0.15},
+    "indoor": {"flat": 0.25, "rooms": 0.2, "blocks": 0.15, "stairs": 0.25, "stairs_down": 0.15},
     "rough": {
         "flat": 0.1,
         "slopes": 0.1,
@@ -24,6 +24,9 @@ GROUNDS: Mapping[str, Mapping[str, float]] = {
     },
 } | {name: {name: 1.0} for name in KINDS}
 """Kinds of ground in each choice, with their shares of the robots."""
+
+QUIET_KINDS = ("flat", "rooms")
+"""Kinds of ground, level for the most part, that keep all of the phase rewards."""
 
 
 @dataclass
@@ -39,13 +42,19 @@ class TerrainCfg:
     """Whether robots that get ahead go on to higher levels, and others back to lower ones."""
     crossed: float = 4.0
     """Distance from its start that a robot gets in an episode to go up a level, m."""
+    passed_share: float = 0.0
+    """Share of the way it was asked for that it must have made as well, or who is slow goes up."""
     command_time: float = 0.0
     """Time between new velocity commands where ground has levels, s; with 0 it is that of all
     commands. Commands that soon follow each other lead nowhere, and over nothing."""
-
     turning_share: float = 1.0
     """Share of the yaw rates' range that commands are drawn from where ground is crossed along x: a
     robot that turns all the time climbs nothing."""
+    ahead_share: float = 0.0
+    """Share of the commands there that lead straight ahead, at 0.3 to 1 of the largest speed."""
+    quiet_share: float = 1.0
+    """What is left of the weight of the phase rewards on stairs, slopes, blocks and uneven ground:
+    soft steps and steps over edges are at odds. Flat ground and rooms keep all of it."""
 
     def __post_init__(self) -> None:
         """Check the fields.
@@ -70,7 +79,10 @@ _RANGES = {
     "first_levels": Range(0, LEVELS - 1, whole=True),
     "crossed": Range(0.0, 1e6, above=True),
     "command_time": Range(0.0, 1e12),
+    "passed_share": Range(0.0, 1.0),
     "turning_share": Range(0.0, 1.0),
+    "ahead_share": Range(0.0, 1.0),
+    "quiet_share": Range(0.0, 1.0),
 }
 
 

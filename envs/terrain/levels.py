@@ -74,12 +74,13 @@ def next_levels(
     travelled: Travelled,
     fallen: torch.Tensor,
     crossed: float,
+    passed_share: float,
     unit: torch.Tensor,
 ) -> torch.Tensor:
     """Return the levels of the next episodes, nearly as is usual in the field (Rudin et al., 2022).
 
-    Up where a robot got away from its start by more than `crossed`, which no circle does, without a
-    fall; down where it fell before it had got so far, or made less than half of the way that it was
+    Up where a robot got away from its start by more than `crossed`, which no circle does, and made
+    its share of the way that it was asked for, without a fall; down where it fell before it had got so far, or made less than half of the way that it was
     asked for. Who has solved the highest level goes to one at random, so that none is forgotten.
 
     Args:
@@ -87,10 +88,11 @@ def next_levels(
         travelled: How far they got; of n robots.
         fallen: Whether they ended in a fall. Shape: (n,), bool.
         crossed: Distance to get away by, m.
+        passed_share: Share of the way that was asked for to have made.
         unit: Random numbers in [0, 1), for those who have solved them all. Shape: (n,).
     """
     far = travelled.away > crossed
-    up = far & ~fallen
+    up = far & ~fallen & (travelled.made >= passed_share * travelled.asked)
     down = ~far & (fallen | (travelled.made < 0.5 * travelled.asked))
     changed = level + up.long() - down.long()
     anywhere = (unit * LEVELS).long()

@@ -47,7 +47,7 @@ def make_motion(**given):
         values[name] = torch.tensor([_padded(row, width) for row in rows])
     for name in ("contact", "touchdown"):
         values[name] = values[name] > 0.5
-    for name in ("base_height", "collisions"):
+    for name in ("base_height", "collisions", "yaw_drift"):
         values[name] = torch.tensor(given.pop(name, [0.0, 0.0]))
     # By physics step, then robot.
     values["foot_vel_z_substeps"] = torch.tensor(

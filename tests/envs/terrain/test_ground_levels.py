@@ -14,14 +14,20 @@ from mute.envs.terrain.levels import Travelled, next_levels
 
 
 def _next(
-    level: int, away: float, made: float, asked: float, fallen: bool = False, unit: float = 0.5
+    level: int,
+    away: float,
+    made: float,
+    asked: float,
+    fallen: bool = False,
+    unit: float = 0.5,
+    share: float = 0.0,
 ) -> int:
     travelled = Travelled(1, torch.device("cpu"))
     travelled.away, travelled.made, travelled.asked = (
         torch.tensor([value]) for value in (away, made, asked)
     )
     after = next_levels(
-        torch.tensor([level]), travelled, torch.tensor([fallen]), 4.0, torch.tensor([unit])
+        torch.tensor([level]), travelled, torch.tensor([fallen]), 4.0, share, torch.tensor([unit])
     )
     return int(after)
 
