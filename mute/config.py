@@ -161,6 +161,10 @@ class AgentCfg:
     """Whether actor and critic see, beside the command, whether it is one to move: a step is taken
     whole or not at all, at 0.1 m/s as at 1, and a network that sees 0.1 as next to nothing
     stands."""
+    heading_gain: float = 0.0
+    """Yaw rate that the trained policy is asked for against each radian that the robot has turned
+    by while it was to go straight, 1/s, see `mute.controllers.heading_hold`; 0 for none. Robots
+    in training have none."""
     init_std: float = 1.0
     """Standard deviation of the actions at the start."""
     std_range: tuple[float, float] = (0.05, 1.2)
@@ -190,6 +194,7 @@ class AgentCfg:
             "noise_interval": Range(0, 10**9, whole=True),
             "actor_hidden": _WIDTH,
             "critic_hidden": _WIDTH,
+            "heading_gain": Range(0.0, 100.0),
             "init_std": _POSITIVE,
             "std_range": _POSITIVE,
         }
@@ -266,9 +271,16 @@ class TaskCfg:
 
         Raises:
             ValueError: If mini-batches would be empty, nobody estimates the phase that is rewarded
-                by, or left and right cannot be treated alike.
+                by, left and right cannot be treated alike, or a heading is to be held unseen.
         """
-        num_envs, agent = self.env.num_envs, self.agent
+        num_envs, agent, scales = self.env.num_envs, self.agent, self.env.observations.scales
+        if agent.heading_gain > 0.0 and not (
+            scales["base_ang_vel"] and scales["projected_gravity"]
+        ):
+            raise ValueError(
+                "agent.heading_gain must be 0 where env.observations.scales have 0 for "
+                f"base_ang_vel or projected_gravity, got {agent.heading_gain:g}"
+            )
         samples = num_envs * agent.num_steps_per_env
         if agent.ppo.num_mini_batches > samples:
             raise ValueError(

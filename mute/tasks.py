@@ -69,6 +69,10 @@ def _go1_mute() -> TaskCfg:
     # Sharp terms pay hardly more for 0.3 m/s than for 0.1 where 0.5 are asked for.
     terms["progress"] = reward_term("progress", 1.0)
     terms["yaw_drift"] = reward_term("yaw_drift", -4.0)
+    # Most robots are on ground that leaves little of these: they make up for it on level ground.
+    for term in terms.values():
+        if term.group == "phase":
+            term.weight *= 1.4
     env = dataclasses.replace(
         task.env,
         # Ground is learnt aloud: with the times of flat ground, robots climb no stairs.
@@ -91,16 +95,18 @@ def _go1_mute() -> TaskCfg:
             command_time=10.0,
             turning_share=0.2,
             ahead_share=0.5,
-            quiet_share=0.25,
+            quiet_share=0.2,
         ),
     )
     agent = dataclasses.replace(
         task.agent,
-        iterations=3600,
+        iterations=2400,
         # Steps are found with much exploration; then, as levels keep robots at the end of what
         # they can, it would grow, and robots would follow commands ever worse.
         late_entropy_share=0.3,
-        entropy_iterations=(650, 750),
+        entropy_iterations=(200, 300),
+        # A stair that a foot strikes turns a robot, which sees no heading.
+        heading_gain=1.5,
         # The last learning rates fall over as many iterations as on flat ground.
         settling_share=0.094,
     )

@@ -80,8 +80,9 @@ def next_levels(
     """Return the levels of the next episodes, nearly as is usual in the field (Rudin et al., 2022).
 
     Up where a robot got away from its start by more than `crossed`, which no circle does, and made
-    its share of the way that it was asked for, without a fall; down where it fell before it had got so far, or made less than half of the way that it was
-    asked for. Who has solved the highest level goes to one at random, so that none is forgotten.
+    its share of the way that it was asked for, without a fall; down where it fell before it had got
+    so far, or made less than half of that way. Who has solved the highest level goes to one at
+    random, so that none is forgotten.
 
     Args:
         level: Of the episodes that end. Shape: (n,), int64.

@@ -12,6 +12,7 @@ from tensordict import TensorDict
 
 from mute.checkpoint import CheckpointError, first_line, load_checkpoint
 from mute.config import TaskCfg, from_plain
+from mute.controllers.heading_hold import heading_hold
 from mute.envs.observations import OBS_DIM
 from mute.envs.quadruped_env import NUM_ACTIONS
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
@@ -90,7 +91,7 @@ def make_policy(saved: dict[str, Any]) -> Policy:
 
 
 class LearnedController:
-    """Drives robots with a trained policy; keeps the estimator's state of each."""
+    """Drives robots with a trained policy; keeps the estimator's state and heading of each."""
 
     def __init__(self, policy: Policy, num_envs: int) -> None:
         """Start with no past.
@@ -101,6 +102,8 @@ class LearnedController:
         """
         self.policy = policy
         self.num_envs = num_envs
+        self._hold = heading_hold(policy.cfg)
+        self._turned = torch.zeros(num_envs, 1)
         self._state = policy.estimator.initial_state(num_envs)
         self.estimate: Estimate | None = None
         """What the estimator said at the last `act`, None before. Shapes: (num_envs, ...)."""
@@ -109,13 +112,16 @@ class LearnedController:
         """Forget the past of the masked robots, or of all. Mask shape: (num_envs,)."""
         if mask is None:
             mask = torch.ones(self.num_envs, dtype=torch.bool)
-        self._state = forgotten(self._state, mask)
+        self._turned, *state = forgotten((self._turned, *self._state), mask)
+        self._state = tuple(state)
 
     @torch.no_grad()
     def act(self, observations: TensorDict) -> torch.Tensor:
         """Return the mean actions for one control step. Shape: (num_envs, 12)."""
-        policy = self.policy
-        obs = policy_group(observations["policy"], policy.estimator)
+        policy, obs = self.policy, observations["policy"]
+        if self._hold is not None:
+            obs, self._turned = self._hold.step(obs, self._turned)
+        obs = policy_group(obs, policy.estimator)
         self.estimate, self._state = policy.estimator.step(obs, self._state)
         with_phase = policy.cfg.agent.estimation.actor_uses_phase
         groups = actor_groups(obs, self.estimate, policy.estimator, policy.cfg.env, with_phase)

@@ -19,6 +19,7 @@ import onnx
 import torch
 from torch import nn
 
+from mute.controllers.heading_hold import heading_hold
 from mute.controllers.learned import Policy
 from mute.envs.observations import OBS_DIM, OBSERVATION_WIDTHS
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
@@ -44,9 +45,11 @@ def export_policy(policy: Policy, out: Path) -> None:
 
     Inputs: `obs` (1, 46), the scaled observation, and what the estimator remembers, zero at the
     start: the LSTM state `h_in` and `c_in`, each (1, lstm_hidden), or the last observations
-    `history_in`. Outputs: `action` (1, 12), the mean action in units of `action_scale`; `phase`
-    (1, 4), in [0, 1], feet in the order FR, FL, RR, RL, where it is estimated; `base_lin_vel`
-    (1, 3), in m/s in the body frame; and the new state `h_out` and `c_out`, or `history_out`.
+    `history_in`; and `turned_in` (1, 1), the angle in rad that the robot has turned by unasked,
+    where the policy holds its heading. Outputs: `action` (1, 12), the mean action in units of
+    `action_scale`; `phase` (1, 4), in [0, 1], feet in the order FR, FL, RR, RL, where it is
+    estimated; `base_lin_vel` (1, 3), in m/s in the body frame; and the new state, each part named
+    `_out` for `_in`.
 
     The metadata has the keys of mjlab's exports, numbers in full precision, and some more:
 
@@ -86,26 +89,33 @@ class _PolicyGraph(nn.Module):
         self.groups = policy.actor.obs_groups
         self.env_cfg = policy.cfg.env
         self.with_phase = policy.cfg.agent.estimation.actor_uses_phase
+        self.hold = heading_hold(policy.cfg)
 
     def forward(self, obs: torch.Tensor, *state: torch.Tensor) -> tuple[torch.Tensor, ...]:
         """Take one control step; shapes as in `export_policy`."""
+        turned = ()
+        if self.hold is not None:
+            state, turned = state[:-1], state[-1:]
+            obs, *turned = self.hold.step(obs, *turned)
         obs = policy_group(obs, self.estimator)
         estimate, state = self.estimator.step(obs, state)
         groups = actor_groups(obs, estimate, self.estimator, self.env_cfg, self.with_phase)
         action = self.actor(torch.cat([groups[name] for name in self.groups], dim=-1))
         phase = [estimate.phase] if self.estimator.num_feet else []
-        return action, *phase, estimate.base_lin_vel, *state
+        return action, *phase, estimate.base_lin_vel, *state, *turned
 
 
 def _state_names(policy: Policy, end: str) -> list[str]:
     """Return what the parts of the estimator's state are called where they go `in` or `out`."""
-    parts = policy.estimator.encoder.state_sizes
-    return [f"{_SHORT_NAMES.get(part, part)}_{end}" for part in parts]
+    parts = [_SHORT_NAMES.get(part, part) for part in policy.estimator.encoder.state_sizes]
+    holds = heading_hold(policy.cfg) is not None
+    return [f"{part}_{end}" for part in (*parts, *(["turned"] if holds else []))]
 
 
 def _graph(policy: Policy) -> onnx.ModelProto:
     """Trace the policy with zeros; the graph has no branch that they could hide."""
-    arguments = (torch.zeros(1, OBS_DIM), *policy.estimator.initial_state(1, "cpu"))
+    turned = () if heading_hold(policy.cfg) is None else (torch.zeros(1, 1),)
+    arguments = (torch.zeros(1, OBS_DIM), *policy.estimator.initial_state(1, "cpu"), *turned)
     phase = ["phase"] if policy.estimator.num_feet else []
     with torch.no_grad(), _quiet_exporter():
         program = torch.onnx.export(

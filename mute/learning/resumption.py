@@ -68,6 +68,7 @@ RULES: dict[str, Rule] = {
     "agent.leading_side": "kept",
     "agent.go_signal": "kept",
     "agent.quiet_factor": "kept",
+    "agent.heading_gain": "applied",
     "agent.init_std": "kept",  # what has been learnt took its place
     "agent.std_range": "applied",
     "agent.matmul_precision": "applied",

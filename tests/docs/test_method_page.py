@@ -132,13 +132,20 @@ def test_the_page_tells_the_figures_of_the_recipe_indoors():
     env, ground = cfg.env, cfg.env.terrain
     lowest, highest = ground.first_levels
     assert lowest == highest
-    assert f"Levels begin at {lowest}; who gets {ground.crossed:g} m away goes up." in told
+    made = f"makes {ground.passed_share:.0%}".replace("%", " %")
+    assert f"Levels begin at {lowest}; who gets {ground.crossed:g} m away, and {made} of" in told
+    assert f"{ground.ahead_share:.0%} of the commands lead".replace("%", " %") in told
+    differs = env.randomization.everything_share
+    assert f"- {differs:.0%} of the robots differ in everything".replace("%", " %") in told
+    assert f"Of what beta scales, {ground.quiet_share:.0%} is left".replace("%", " %") in told
     share = {5.0: "a fifth"}[1.0 / ground.turning_share]
     assert f"a velocity command lasts {ground.command_time:g} s and turns {share} as fast" in told
     assert f"as commands of {_CFG.env.commands.resampling_time:g} s cross nothing" in told
     ours, flat = env.rewards.terms.keys(), _CFG.env.rewards.terms.keys()
-    (added,), (gone,) = ours - flat, flat - ours
-    assert f"`{added}` in place of `{gone}`" in told
+    assert flat - ours == {"tilt"} and "`lean` in place of `tilt`" in told
+    assert ours - flat == {"lean", "progress", "yaw_drift"}
+    for name in ("progress", "yaw_drift"):
+        assert f"`{name}`, of weight {env.rewards.terms[name].weight:g}, " in told
     assert f"Physics steps are {1000.0 * env.scene.timestep:g} ms" in told
     softest, stiffest = env.randomization.floor_stiffness
     assert f"their stiffness is {softest:g} to {stiffest:g} of it" in told

@@ -567,6 +567,24 @@ def test_the_velocity_error_is_averaged_over_the_time_that_is_asked_for(time):
     assert float(env.followed.error.abs().max()) > 0.1
 
 
+def test_the_drift_of_the_heading_is_averaged_over_two_seconds():
+    env = _make_env(2, **CALM)
+    env.set_command(torch.tensor([0.0, 0.0, 0.5, 0.0]))
+    drift = torch.zeros(2)
+    for step in range(10):
+        if step == 6:
+            env.reset(torch.tensor([True, False]))
+            env.set_command(torch.tensor([0.0, 0.0, 0.5, 0.0]))
+            drift[0] = 0.0
+        env.step(torch.zeros(2, 12))
+        drift += (1.0 - math.exp(-env.step_dt / 2.0)) * (0.5 - env.base_ang_vel[:, 2] - drift)
+        torch.testing.assert_close(env.followed.drift, drift)
+    kept = env.followed.state_dict()
+    env.followed.reset(torch.ones(2, dtype=torch.bool))
+    env.followed.load_state_dict(kept)
+    torch.testing.assert_close(env.followed.drift, drift)
+
+
 def test_what_is_followed_goes_from_command_to_command_with_the_acceleration_that_is_asked_for():
     env = _make_env(2, rewards=RewardsCfg(following_acceleration=5.0), **CALM)
     commands = torch.tensor([[0.25, -0.3, 0.0, 0.0], [-0.05, 0.0, 0.1, 0.0]])

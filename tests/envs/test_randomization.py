@@ -18,6 +18,7 @@ from mute.envs.randomization import (
 )
 from mute.envs.scene import FloorPatch, SceneCfg, build_scene
 from mute.envs.sensors import RobotSensors
+from mute.envs.terrain import TerrainCfg, kind_of_robot
 
 MODEL = build_scene(SceneCfg())
 TRUNK = MODEL.body("trunk").id
@@ -247,7 +248,8 @@ def test_full_randomization_leaves_nothing_that_robots_have_alike():
     assert ranges["added_mass"] == (-1.0, 3.0)
     assert ranges["action_delay"] == (0.0, 0.02)
     assert ranges["friction_factor"][0] * SceneCfg().floor_friction == pytest.approx(0.3)
-    assert len(ranges) == len([name for name in vars(cfg) if not name.startswith("push_")]) - 1
+    others = {"enabled", "everything_share", "push_interval", "push_velocity"}
+    assert set(vars(cfg)) == set(ranges) | others
     simulation, drawn = _randomize(model=DELAYED, **vars(cfg))
     for name in (*FIELDS, "actuator_delay"):
         rows = simulation.field(name).reshape(NUM_ENVS, -1)
@@ -391,3 +393,36 @@ def test_the_trunk_may_lose_all_but_a_little_of_its_mass():
     simulation, _ = _randomize(added_mass=(-5.2, -5.2))
     mass = simulation.field("body_mass")[:, TRUNK].double()
     torch.testing.assert_close(mass, torch.full_like(mass, 0.004), atol=1e-6, rtol=0.0)
+
+
+def test_a_share_of_the_robots_differs_in_everything_and_the_others_as_usual():
+    count = 200
+    simulation = BatchSimulation(DELAYED, count, num_threads=1)
+    cfg = RandomizationCfg(everything_share=0.25, added_mass=(0.1, 0.2), friction_loss=(0.0, 0.0))
+    drawn = randomize_physics(simulation, cfg, torch.Generator().manual_seed(0))
+    delay = simulation.field("actuator_delay")[:, 0].double()
+    differs = delay > 0.0
+    assert int(differs.sum()) == count // 4
+    added = simulation.field("body_mass")[:, TRUNK].double() - MODEL.body_mass[TRUNK]
+    assert added[~differs].min() >= 0.1 and added[~differs].max() <= 0.2
+    assert added[differs].min() < -0.5 and added[differs].max() > 2.5
+    for values in (
+        drawn.encoder_offset.abs().sum(dim=1),
+        simulation.field("dof_frictionloss")[:, 6:].sum(dim=1),
+        (simulation.field("dof_armature").double() - _of_model("dof_armature"))[:, 6:].abs().sum(1),
+    ):
+        assert torch.equal(values.cpu() > 0.0, differs)
+    # What the critic knows is told on one scale: a delay of nothing is -1.
+    known = drawn.known[:, KNOWN.index("action_delay") + 2].double()
+    torch.testing.assert_close(known, delay / 0.01 - 1.0)
+
+
+def test_robots_that_differ_in_everything_are_on_every_kind_of_ground():
+    cfg = RandomizationCfg(everything_share=0.5)
+    simulation = BatchSimulation(DELAYED, 1024, num_threads=1)
+    randomize_physics(simulation, cfg, torch.Generator().manual_seed(0))
+    differs = simulation.field("actuator_delay")[:, 0] > 0.0
+    kinds = kind_of_robot(TerrainCfg(kind="indoor"), 1024)
+    for name in set(kinds):
+        of_kind = torch.tensor([kind == name for kind in kinds])
+        assert float(differs[of_kind].double().mean()) == pytest.approx(0.5, abs=0.1)

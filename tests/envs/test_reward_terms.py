@@ -59,6 +59,11 @@ CASES = {
         },
         [0.5**2, 0.4**2],
     ),
+    "progress": (
+        {"command": [[0.3, 0.4], [0.5]], "velocity_error": [[0.3, 0.0], [1.2, 0.3]]},
+        [1.0 - 0.09 / 0.25, -1.0],  # what is missing along it; backwards, but no more than once
+    ),
+    "yaw_drift": ({"yaw_drift": [-0.1, 0.5]}, [0.1, 0.3]),
     "lin_vel_z": ({"base_lin_vel": [[9.0, 9.0, -0.5], [0, 0, 2.0]]}, [0.25, 4.0]),
     "ang_vel_xy": ({"base_ang_vel": [[3.0, -4.0, 100.0], [0.0, 1.0]]}, [25.0, 1.0]),
     "joint_power": (
@@ -185,6 +190,7 @@ def test_a_function_gives_what_was_computed_by_hand(name):
         ("foot_clearance", {"target": 0.2}, 0.01 + 3 * 0.04 * 0.0),
         ("touchdown_apex", {"target": 0.1}, 0.4),
         ("stamping", {"above": 0.1}, 0.01),
+        ("yaw_drift", {"most": 0.2}, 0.2),
         ("stepping", {"period": 0.3}, 0.3),
         ("stepping", {"target": 0.12}, 0.25),
         ("soft_steps", {"speed": 0.2}, 0.5 * math.exp(-1.0)),
@@ -196,6 +202,7 @@ def test_a_parameter_changes_its_function(name, params, expected):
     motion = make_motion(
         command=[[1.0, 0.0, 0.5], []],
         velocity_error=[[1.0, 0.0, 0.5], []],
+        yaw_drift=[0.25, 0.0],
         touchdown=[[1], []],
         swing_apex=[[0.06], []],
         stride_time=[[0.5], []],
@@ -221,7 +228,7 @@ def test_every_parameter_of_every_function_was_tried():
     tried |= {("near_ground_drop", "depth"), ("base_height", "desired")}
     tried |= {("foot_clearance", "target"), ("touchdown_apex", "target")}
     tried |= {("stepping", "period"), ("stepping", "target"), ("feet_lifted", "speed")}
-    tried |= {("stamping", "above"), ("foot_speed_change", "most")}
+    tried |= {("yaw_drift", "most"), ("stamping", "above"), ("foot_speed_change", "most")}
     tried |= {("soft_steps", key) for key in ("speed", "period", "target")}
     assert tried == {
         (name, key) for name, function in REWARD_FUNCTIONS.items() for key in function.parameters

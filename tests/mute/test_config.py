@@ -175,7 +175,7 @@ def test_every_count_of_the_agent_has_an_upper_end(cls, name):
 
 def test_the_agents_fields_with_numbers_are_all_found():
     names = {name for _, name in _fields_with_numbers()}
-    assert len(_fields_with_numbers()) == 11 + 10 + 7 + 6
+    assert len(_fields_with_numbers()) == 12 + 10 + 7 + 6
     assert {"actor_hidden", "std_range", "learning_rate", "lambda_kl"} <= names
 
 

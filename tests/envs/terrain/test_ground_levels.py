@@ -9,7 +9,9 @@ from mute.envs.commands import CommandsCfg
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.quadruped_env_cfg import QuadrupedEnvCfg
 from mute.envs.randomization import RandomizationCfg
+from mute.envs.rewards import RewardsCfg, reward_term
 from mute.envs.terrain import BoxGround, TerrainCfg, kind_of_robot
+from mute.envs.terrain.commands import suit_commands
 from mute.envs.terrain.levels import Travelled, next_levels
 
 
@@ -49,6 +51,11 @@ def test_a_robot_goes_up_where_it_crossed_and_down_where_it_fell_or_made_less_th
     level, away, made, asked, fallen, after
 ):
     assert _next(level, away, made, asked, fallen) == after
+
+
+@pytest.mark.parametrize(("made", "after"), [(5.9, 2), (6.1, 3)])
+def test_who_is_slow_does_not_go_up_where_a_share_of_the_way_is_asked_for(made, after):
+    assert _next(2, 5.0, made, 8.0, share=0.75) == after
 
 
 @pytest.mark.parametrize(("unit", "after"), [(0.0, 0), (0.39, 1), (0.99, 4)])
@@ -166,3 +173,46 @@ def test_commands_turn_less_where_ground_is_crossed_along_x_if_they_are_told_to(
     torch.testing.assert_close(less[straight, 2], 0.25 * all_of_it[straight, 2])
     assert torch.equal(less[~straight], all_of_it[~straight])
     assert torch.equal(less[:, :2], all_of_it[:, :2])
+
+
+def test_some_commands_lead_ahead_where_ground_is_crossed_along_x_if_they_are_told_to():
+    velocity = torch.tensor([[-0.5, 0.2, 0.4]]).repeat(4, 1)
+    across = torch.tensor([True, True, True, False])
+    draw = torch.tensor([[0.4, 0.0], [0.4, 0.5], [0.6, 0.5], [0.4, 0.5]])
+    cfg = TerrainCfg(ahead_share=0.5, turning_share=0.25)
+    suited = suit_commands(velocity, across, cfg, 2.0, draw)
+    # Ahead at 0.3 and at 0.65 of the largest speed; one of the others; on other ground.
+    expected = [[0.6, 0.0, 0.0], [1.3, 0.0, 0.0], [-0.5, 0.2, 0.1], [-0.5, 0.2, 0.4]]
+    torch.testing.assert_close(suited, torch.tensor(expected))
+
+
+def test_commands_ahead_grow_with_the_ranges():
+    cfg = QuadrupedEnvCfg(
+        num_envs=40,
+        num_threads=1,
+        terrain=TerrainCfg(kind="stairs", ahead_share=1.0),
+        commands=CommandsCfg(initial_share=0.5, ramp=(0.0, 1e6)),
+    )
+    ahead = QuadrupedEnv(cfg).commands.command[:, 0]
+    assert 0.15 <= float(ahead.min()) < 0.2 and 0.45 < float(ahead.max()) <= 0.5
+
+
+def test_stairs_and_blocks_are_paid_less_for_silence_if_they_are_told_to():
+    def paid(share: float) -> tuple[torch.Tensor, list[str]]:
+        cfg = QuadrupedEnvCfg(
+            num_envs=30,
+            num_threads=1,
+            terrain=TerrainCfg(kind="indoor", quiet_share=share),
+            rewards=RewardsCfg(terms={"near": reward_term("near_ground_drop", -1.0)}),
+        )
+        env = QuadrupedEnv(cfg)
+        assert isinstance(env.ground, BoxGround)
+        env.set_command(torch.tensor((0.5, 0.0, 0.0, 1.0)))
+        _, reward, _, _ = env.step(torch.full((30, 12), 0.5))
+        return reward, [env.ground.kinds[kind] for kind in env.ground.kind.tolist()]
+
+    (all_of_it, kinds), (less, _) = paid(1.0), paid(0.25)
+    assert bool((all_of_it < 0.0).all())
+    shares = torch.tensor([1.0 if kind in ("flat", "rooms") else 0.25 for kind in kinds])
+    assert 0 < int((shares == 1.0).sum()) < 30
+    torch.testing.assert_close(less, shares * all_of_it)

@@ -39,13 +39,19 @@ EXAMPLE = REPOSITORY / "examples" / "run_onnx.py"
 HIDDEN = 24
 
 
-def _make_cfg(actor_uses_phase: bool = True, go_signal: bool = False) -> TaskCfg:
+def _make_cfg(
+    actor_uses_phase: bool = True, go_signal: bool = False, heading_gain: float = 0.0
+) -> TaskCfg:
     estimation = EstimationCfg(
         network=EstimatorCfg(lstm_hidden=HIDDEN, latent_dim=5, phase_hidden=(8,)),
         actor_uses_phase=actor_uses_phase,
     )
     agent = AgentCfg(
-        actor_hidden=(16, 8), critic_hidden=(8,), go_signal=go_signal, estimation=estimation
+        actor_hidden=(16, 8),
+        critic_hidden=(8,),
+        go_signal=go_signal,
+        heading_gain=heading_gain,
+        estimation=estimation,
     )
     env = QuadrupedEnvCfg(
         num_envs=4,
@@ -180,6 +186,18 @@ def test_a_policy_that_is_told_whether_to_go_is_reproduced_too(tmp_path: Path, s
     policy = load_policy(_write_checkpoint(tmp_path / "told.pt", cfg))
     export_policy(policy, tmp_path / "told.onnx")
     _assert_same_outputs(policy, tmp_path / "told.onnx", steps=20)
+
+
+def test_a_policy_that_holds_its_heading_is_reproduced_too(tmp_path: Path):
+    cfg = _make_cfg(heading_gain=1.5)
+    ahead = dataclasses.replace(cfg.env.commands, single_axis_fraction=1.0, standing_fraction=0.2)
+    cfg = dataclasses.replace(cfg, env=dataclasses.replace(cfg.env, commands=ahead))
+    policy = load_policy(_write_checkpoint(tmp_path / "holds.pt", cfg))
+    export_policy(policy, tmp_path / "holds.onnx")
+    assert json.loads(_metadata(tmp_path / "holds.onnx")["recurrent_state"])["turned_in"] == (
+        "turned_out"
+    )
+    assert _assert_same_outputs(policy, tmp_path / "holds.onnx", steps=500) >= 2
 
 
 def test_two_robots_driven_by_torch_and_by_onnx_stay_together(policy: Policy, exported: Path):

@@ -245,6 +245,19 @@ const reduceSum: Builder = (node, inputs) => {
   return [[y], step];
 };
 
+const clip: Builder = (node, inputs) => {
+  const x = input(node, inputs, 0);
+  const [least, most] = [1, 2].map((index) => whole(node, inputs, index));
+  require(least !== undefined && most !== undefined && inputs.length === 3, node);
+  const y = empty(x.shape);
+  const step = () => {
+    for (let i = 0; i < x.data.length; i++) {
+      y.data[i] = Math.min(Math.max(x.data[i] as number, least), most);
+    }
+  };
+  return [[y], step];
+};
+
 const same: Builder = (node, inputs) => [[input(node, inputs, 0)], () => undefined];
 
 const sigmoid = (x: number) => 1 / (1 + Math.exp(-x));
@@ -269,6 +282,7 @@ const BUILDERS: ReadonlyMap<string, Builder> = new Map<string, Builder>([
   ],
   ["Split", split],
   ["Concat", concat],
+  ["Clip", clip],
   ["Slice", slice],
   ["ReduceSum", reduceSum],
   // A truth is 0 or 1 here already.
