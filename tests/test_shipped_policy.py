@@ -110,7 +110,7 @@ def test_randomised_robots_with_noisy_sensors_start(exam):
 
 
 def test_randomised_robots_follow_slow_and_fast_commands(exam):
-    assert exam["smallest actual over commanded speed, beta 0"] >= 0.7
+    assert exam["smallest actual over commanded speed, beta 0"] >= 0.8
     assert exam["largest actual over commanded speed, beta 0"] <= 1.2
     assert exam["smallest actual over commanded speed, beta 1"] >= 0.6
     assert exam["squared velocity error, beta 0"] <= 0.03
@@ -120,7 +120,7 @@ def test_randomised_robots_follow_slow_and_fast_commands(exam):
 def test_randomised_robots_stand_in_silence_and_take_a_push(exam):
     assert exam["robots whose feet are down and stay down, at the worst beta"] == 1.0
     assert exam["robots still again 3 s after a push, at the worst beta"] >= 0.8
-    assert exam["joint speed without noise, at the worst beta"] <= 0.04
+    assert exam["joint speed without noise, at the worst beta"] <= 0.08
     # Where sensors are noisy torques change their signs in a stand, and gears are heard.
     assert exam["level at the trunk, at the worst beta"] <= 61.0
 

@@ -154,12 +154,23 @@ def policy_figures(recipe: Recipe) -> str:
         f"{card['iterations']} iterations, {card['steps'] / 1e6:.1f} M steps, "
         f"{card['wall_time_minutes']:.0f} min on {card['machine']}. Its files and the figures of "
         "this section are made by `python -m mute.release --checkpoint "
-        f"runs/{recipe.task}/RUN/model_{card['iterations'] - 1}.pt`.\n\n"
+        f"runs/{recipe.task}/RUN/model_{card['iterations'] - 1}.pt`.{_gone_on(card)}\n\n"
         f"{_first_walk(recipe)}\n\n"
         f"Over the command range, {figures['trials']} trials of {figures['seconds']:g} s:\n\n"
         f"{markdown(figures['range'], _RANGE)}\n\n"
         f"At an actual forward speed of {figures['speed']:g} m/s:\n\n"
         f"{markdown(in_cm, _AT_SPEED)}"
+    )
+
+
+def _gone_on(card: Mapping[str, Any]) -> str:
+    """Tell whether the training had been stopped, and where it is told how it went on."""
+    if not card.get("resumed"):
+        return ""
+    times = len(card["resumed"])
+    return (
+        f" It was stopped {times} time{'s' if times > 1 else ''} on the way: by which commands it "
+        f"went on is in its card, `resources/go1/{card['task']}.json`."
     )
 
 

@@ -13,6 +13,7 @@ from mute.command_lines import card
 from mute.command_lines.card_reliability import SeedFiles, median_seed
 from mute.command_lines.card_results import results_page, summary
 from mute.command_lines.card_tables import markdown, mean_and_spread
+from mute.command_lines.card_trainings import policy_figures
 from mute.support.errors import MuteError
 
 _MPC = ["# The model-predictive controller"]
@@ -86,6 +87,18 @@ def test_the_recipe_of_flat_ground_has_a_section_of_its_own_where_another_ships(
     assert own.count("(the task was called `go1_mute` then)") == 1
     assert "docs/reliability/go1_mute_flat/" in own
     assert page.count("Not every training of `go1_mute_flat`") == 1
+
+
+@pytest.mark.parametrize(("times", "told"), [(1, "1 time on"), (2, "2 times on")])
+def test_the_page_tells_whether_a_training_was_stopped_and_where_it_is_told_more(
+    files, times, told
+):
+    recipe = files.flat
+    assert "was stopped" not in policy_figures(recipe)
+    card = recipe.card | {"resumed": ["python train.py --resume model_3.pt"] * times}
+    page = policy_figures(dataclasses.replace(recipe, card=card))
+    assert f"It was stopped {told} the way" in page
+    assert "`resources/go1/go1_mute_flat.json`" in page
 
 
 def test_the_policies_that_ship_are_the_ones_in_the_middle(files):
