@@ -181,7 +181,7 @@ class BoxGround(Ground):
             for name in ("geom_pos", "geom_size", "geom_quat", "geom_aabb", "geom_rbound")
         )
         fields = (self._pos, self._size, self._aabb, self._rbound)
-        self._away = [field[0, self._boxes].clone() for field in fields]
+        self._away = [(field, field[0, self._boxes].clone()) for field in fields]
         self._put_away()
 
     def height(self, points: torch.Tensor, robots: torch.Tensor | None = None) -> torch.Tensor:
@@ -267,8 +267,7 @@ class BoxGround(Ground):
 
     def _put_away(self) -> None:
         """Leave every box as the model has it, away from the robots and not turned."""
-        fields = (self._pos, self._size, self._aabb, self._rbound)
-        for field, away in zip(fields, self._away, strict=True):
+        for field, away in self._away:
             field[:, self._boxes] = away
         self._quat[:, self._boxes] = 0.0
         self._quat[:, self._boxes, 0] = 1.0

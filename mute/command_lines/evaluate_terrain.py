@@ -117,7 +117,7 @@ def terrain(args: TerrainArgs) -> int:
     args = args.with_policy_found()
     policy = load_policy(args.policy)
     if not args.heading_hold:
-        policy = policy.without_heading_hold()
+        policy = policy.with_heading_gain(0.0)
     make_directory(args.out)
     torch.set_num_threads(1)  # the physics engine has the cores
     tasks = [task for task in _tasks(args, policy) if task.part in args.parts]

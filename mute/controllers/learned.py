@@ -45,9 +45,9 @@ class Policy:
         """Whether it was trained with beta, and sees it."""
         return self.cfg.agent.quiet_factor
 
-    def without_heading_hold(self) -> Policy:
-        """Return the same policy, which sees its commands as they are."""
-        agent = dataclasses.replace(self.cfg.agent, heading_gain=0.0)
+    def with_heading_gain(self, gain: float) -> Policy:
+        """Return the same policy with another `agent.heading_gain`; with 0 it holds no heading."""
+        agent = dataclasses.replace(self.cfg.agent, heading_gain=gain)
         return dataclasses.replace(self, cfg=dataclasses.replace(self.cfg, agent=agent))
 
     def controller(self, cfg: QuadrupedEnvCfg) -> LearnedController:

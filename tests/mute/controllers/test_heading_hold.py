@@ -106,9 +106,7 @@ def test_it_takes_left_and_right_alike():
 
 
 def _flat_policy(gain: float) -> Policy:
-    policy = load_policy(RESOURCES / "go1" / "go1_mute_flat.pt")
-    agent = dataclasses.replace(policy.cfg.agent, heading_gain=gain)
-    return dataclasses.replace(policy, cfg=dataclasses.replace(policy.cfg, agent=agent))
+    return load_policy(RESOURCES / "go1" / "go1_mute_flat.pt").with_heading_gain(gain)
 
 
 def _headings_off(gain: float) -> torch.Tensor:
