@@ -63,7 +63,7 @@ def _policy_trial(upset: int | None, from_energies: bool) -> tuple[HeardLevels, 
         if step == upset:
             env.simulation.qpos[0, 3:7] = torch.tensor([0.0, 1.0, 0.0, 0.0])
         elif upset is not None and step == upset + 10:
-            env.simulation.qpos[0, 2] += 0.2  # it stumbles as it gets going again
+            env.simulation.qpos[0, 2] += 0.4  # it stumbles as it gets going again
 
     command = torch.tensor((0.5, 0.0, 0.0, 0.0))
     with listener:
