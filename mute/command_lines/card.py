@@ -55,6 +55,8 @@ class CardArgs:
     mpc: Path = _DOCS / "mpc"
     """Directory of what `evaluate.py reliability` and `noise` wrote with --controller mpc, and
     speed.json of `benchmarks.mpc`."""
+    comparison: Path = _DOCS / "paper" / "comparison.json"
+    """File that `evaluate.py paper` wrote; without, the results tell of no other controller."""
     benchmark: Path = _DOCS / "benchmark.json"
     """File that `mute.benchmark --out` wrote; peers.json, peer_walks.json, physics.json and
     walking.json lie beside it."""
@@ -128,6 +130,7 @@ def read_results(args: CardArgs) -> ResultFiles:
     """
     beside = args.noise.parent
     flat = (args.reliability / FLAT_TASK).is_dir()
+    compared = args.comparison.is_file() or args.comparison != CardArgs.comparison
     return ResultFiles(
         ships=_recipe(DEFAULT_TASK, args.card, args.reliability),
         flat=_recipe(FLAT_TASK, args.flat_card, args.reliability) if flat else None,
@@ -139,6 +142,8 @@ def read_results(args: CardArgs) -> ResultFiles:
         fitted=_fitted_row(),
         fitted_policy=_read(CALIBRATION_FILE, "policy")["policy"],
         calibration=file_sha256(CALIBRATION_FILE),
+        comparison=_read(args.comparison, *_COMPARED) if compared else None,
+        comparison_folder=args.comparison.parent.name,
     )
 
 
@@ -146,6 +151,8 @@ def _recipe(task: str, card: Path, folder: Path) -> Recipe:
     return read_recipe(task, _read(card, *CARD), folder / task)
 
 
+_COMPARED = ("command", "walkers", "levels", "sweep", "walk", "calibration", "figures")
+"""What the page of results tells of other controllers."""
 _SPEED = ("rates", "options", "num_envs", "turns", "timestep", "machine")
 """What the page on ground tells of speed."""
 _LEVELS = ("robots", "surface", "beta", "mnl_mean", "mnl_ci95", "pnl_mean", "pnl_ci95")

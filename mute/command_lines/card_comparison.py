@@ -23,7 +23,7 @@ from mute.evaluation.comparison.measurements import FLOORS_COMPARED, MADE_WITH
 from mute.evaluation.comparison.verdicts import verdicts
 from mute.evaluation.paper_levels import PAPER_WALK
 
-__all__ = ["comparison_report", "measured_before"]
+__all__ = ["comparison_report", "comparison_section", "measured_before"]
 
 Row = Mapping[str, Any]
 
@@ -50,6 +50,28 @@ def comparison_report(found: Mapping[str, Any]) -> str:
         parts += ["## The long walk", _walk_text(walk)]
     figures = [f"![{name}]({name}.png)" for name in found["figures"]]
     return "\n\n".join([*parts, *figures]) + "\n"
+
+
+def comparison_section(found: Mapping[str, Any], folder: str) -> str:
+    """Return what the results page tells of the report: its verdicts and its levels.
+
+    Args:
+        found: What the command wrote to `comparison.json`.
+        folder: Where that file and the report lie, as seen from the page.
+    """
+    fitted, rows = _fitted_cell(found), found["levels"]
+    told = verdicts(rows, found["sweep"], found["walk"], fitted)
+    methods = ", ".join(
+        f"{method} ({count} training{'s' * (count > 1)})"
+        for method, count in Counter(row["method"] for row in found["walkers"]).items()
+    )
+    figures = "\n".join(f"![{name}]({folder}/{name}.png)" for name in found["figures"])
+    return (
+        f"## Beside other controllers\n\n{methods}, on the same robot: what the paper found, and "
+        f"whether it comes out here. `{found['command']}` measured it, and wrote the "
+        f"[whole report]({folder}/comparison.md).\n\n{_verdicts_table(told)}\n\n"
+        f"{_levels_text(found)}\n\n{_levels_table(rows, fitted)}\n\n{figures}"
+    )
 
 
 def _head(found: Mapping[str, Any]) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from mute.command_lines.card_comparison import comparison_section
 from mute.command_lines.card_reliability import reliability_section, unmet
 from mute.command_lines.card_tables import (
     markdown,
@@ -86,6 +87,10 @@ class ResultFiles:
     """The policy that had that level in the fit: its task, beta and SHA-256."""
     calibration: str
     """SHA-256 of the file of that fit."""
+    comparison: Mapping[str, Any] | None = None
+    """What `evaluate.py paper` wrote, if it did."""
+    comparison_folder: str = "paper"
+    """Where that lies, as seen from the page."""
 
     @property
     def fitted_here(self) -> tuple[str, str] | None:
@@ -103,6 +108,7 @@ def results_page(files: ResultFiles) -> str:
         f"## Whether one can rely on it\n\n{_reliability(files.ships)}",
         f"## The policy that ships\n\n{policy_figures(files.ships)}",
         _noise(files),
+        *_beside_others(files),
         *_flat(files),
         _paper_task(files),
         _shortcomings(files),
@@ -175,6 +181,12 @@ def _flat(files: ResultFiles) -> list[str]:
         _reliability(recipe),
         policy_figures(recipe),
     ]
+
+
+def _beside_others(files: ResultFiles) -> list[str]:
+    if files.comparison is None:
+        return []
+    return [comparison_section(files.comparison, files.comparison_folder)]
 
 
 def _noise(files: ResultFiles) -> str:

@@ -7,6 +7,7 @@ import json
 import re
 
 import pytest
+from comparison_rows import floors
 from places import REPOSITORY
 
 from mute.command_lines import card
@@ -77,6 +78,28 @@ def test_a_robot_that_fell_in_one_training_is_counted(files):
     fallen = files.ships.seeds | {seed: dataclasses.replace(run, gait=run.gait | {"range": worse})}
     changed = summary(_with(files, fallen))
     assert f"| 0 | {round(sum(gaits)) + 2} of {robots} |" in changed
+
+
+def test_what_was_compared_has_a_section_of_its_own_on_the_page(files):
+    alone = dataclasses.replace(files, comparison=None)
+    assert "## Beside other controllers" not in results_page(alone)
+    in_use = {"label": None, "floor": None, "policy_sha256": None, "transmissibility": 0.1}
+    compared = {
+        "command": "python evaluate.py paper",
+        "walkers": [{"method": "MPC", "sha256": None}, {"method": "MUTE", "sha256": "ab"}],
+        "levels": floors("MPC", 78.0, 77.0, 76.0) + floors("MUTE, beta 0", 70.0, 68.0, 77.0),
+        "sweep": [],
+        "walk": None,
+        "calibration": {"in_use": in_use, "fits": []},
+        "figures": ["front"],
+    }
+    page = results_page(dataclasses.replace(alone, comparison=compared))
+    own = page.split("## Beside other controllers")[1].split("\n## ")[0]
+    assert "MPC (1 training), MUTE (1 training), on the same robot" in own
+    assert "| MPC > MUTE, beta 0 on wood | 78.0 > 70.0 dBA | yes |" in own
+    assert "| MPC > MUTE, beta 0 on tile | 76.0 > 77.0 dBA | **no** |" in own
+    assert "| MUTE, beta 0 | carpet | 68.0 ± 0.5 | 67.4 |" in own
+    assert "(paper/comparison.md)" in own and "![front](paper/front.png)" in own
 
 
 def test_the_recipe_of_flat_ground_has_a_section_of_its_own_where_another_ships(files):
