@@ -29,7 +29,7 @@ from mute.evaluation.trials import evaluation_cfg
 from mute.support.errors import run_cli
 from mute.support.plain_data import without_nan
 from mute.support.ranges import Range
-from mute.support.resources import RESOURCES
+from mute.support.resources import shipped_file
 from mute.tasks import FLAT_TASK
 
 from .gpu_memory import peak_of_this_process
@@ -80,7 +80,7 @@ def compare(device: str, num_envs: int, steps: int) -> dict[str, object]:
         num_envs: Robots.
         steps: Control steps.
     """
-    policy = load_policy(RESOURCES / "go1" / f"{FLAT_TASK}.pt")
+    policy = load_policy(shipped_file(FLAT_TASK))
     cfg = evaluation_cfg(policy.cfg.env, num_envs, 30.0, seed=3, randomized=True)
     env = QuadrupedEnv(cfg)
     command = torch.zeros(num_envs, 4)

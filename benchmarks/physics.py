@@ -46,7 +46,7 @@ from mute.evaluation.trials import evaluation_cfg
 from mute.support.errors import run_cli
 from mute.support.provenance import machine_kind
 from mute.support.ranges import Range
-from mute.support.resources import RESOURCES
+from mute.support.resources import shipped_file
 from mute.support.threads import core_share, use_collection_threads
 from mute.tasks import FLAT_TASK
 
@@ -156,7 +156,7 @@ VARIANTS = (
 class PhysicsBenchmarkArgs:
     """Arguments of the benchmark."""
 
-    policy: Path = RESOURCES / "go1" / f"{FLAT_TASK}.pt"
+    policy: Path = shipped_file(FLAT_TASK)
     """The policy that walks."""
     num_envs: int = 1024
     """Robots that are stepped."""

@@ -25,7 +25,7 @@ from mute.evaluation.usual_robots import robots_cfg
 from mute.support.errors import run_cli
 from mute.support.provenance import current_commit, machine_kind
 from mute.support.ranges import Range
-from mute.support.resources import RESOURCES
+from mute.support.resources import shipped_file
 from mute.tasks import FLAT_TASK, QUIET_TERM_TASKS, make_task
 
 __all__ = ["QuietTermsArgs", "costs", "main"]
@@ -38,7 +38,7 @@ _SPEED = 0.5
 class QuietTermsArgs:
     """Arguments of the measurement."""
 
-    policy: Path = RESOURCES / "go1" / f"{FLAT_TASK}.pt"
+    policy: Path = shipped_file(FLAT_TASK)
     """Whose landings are measured, at beta 0."""
     robots: int = 48
     """Number of robots."""

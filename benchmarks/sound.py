@@ -51,7 +51,7 @@ from mute.evaluation.usual_robots import robots_cfg
 from mute.support.errors import run_cli
 from mute.support.processes import call_apart, peak_memory_mb
 from mute.support.provenance import machine_kind
-from mute.support.resources import RESOURCES
+from mute.support.resources import shipped_file
 from mute.tasks import DEFAULT_TASK
 
 __all__ = ["Part", "SoundBenchmarkArgs", "Times", "measure"]
@@ -68,7 +68,7 @@ _SEED = 1
 class SoundBenchmarkArgs:
     """Arguments of the benchmark."""
 
-    policy: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
+    policy: Path = shipped_file(DEFAULT_TASK)
     """The policy that walks."""
     trials: int = 64
     """Robots that walk side by side."""

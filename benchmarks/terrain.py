@@ -36,7 +36,7 @@ from mute.evaluation.tables import print_table, write_json
 from mute.support.errors import run_cli
 from mute.support.provenance import machine_kind
 from mute.support.ranges import Range
-from mute.support.resources import RESOURCES
+from mute.support.resources import shipped_file
 from mute.support.threads import use_collection_threads
 from mute.tasks import DEFAULT_TASK
 
@@ -70,7 +70,7 @@ the others are compared with."""
 class TerrainBenchmarkArgs:
     """Arguments of the benchmark."""
 
-    policy: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
+    policy: Path = shipped_file(DEFAULT_TASK)
     """The policy that walks."""
     num_envs: int = 1024
     """Robots that are stepped."""

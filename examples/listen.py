@@ -54,8 +54,9 @@ from mute.evaluation.usual_robots import robots_cfg
 from mute.support.errors import MuteError, run_cli
 from mute.support.files import write_file
 from mute.support.ranges import Range
-from mute.support.resources import RESOURCES
+from mute.support.resources import shipped_file
 from mute.support.threads import use_collection_threads
+from mute.tasks import DEFAULT_TASK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -96,7 +97,7 @@ _DEPTH = 60.0
 class ListenArgs:
     """Arguments of the program."""
 
-    policy: Path = RESOURCES / "go1" / "go1_mute.pt"
+    policy: Path = shipped_file(DEFAULT_TASK)
     """Who walks: a checkpoint."""
     surface: str = "wood"
     """Floor: wood, parquet, laminate, carpet, tile or concrete."""

@@ -28,8 +28,9 @@ from PIL import Image, ImageDraw, ImageFont
 from mute.rendering.backend import find_backend
 from mute.support.errors import MuteError, run_cli
 from mute.support.files import replace_file
-from mute.support.resources import RESOURCES
+from mute.support.resources import shipped_file
 from mute.support.threads import configure_threads
+from mute.tasks import DEFAULT_TASK
 
 if TYPE_CHECKING:
     from mute.envs.quadruped_env import QuadrupedEnv
@@ -89,7 +90,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=Path("side_by_side.webp"), help="file to write")
     parser.add_argument("--seconds", type=float, default=4.5, help="length of the film, s")
-    policy = RESOURCES / "go1" / "go1_mute.pt"
+    policy = shipped_file(DEFAULT_TASK)
     parser.add_argument("--policy", type=Path, default=policy, help="who walks")
     args = parser.parse_args(sys.argv[1:] if argv is None else argv)
     if args.out.suffix != ".webp" or not args.out.parent.is_dir():

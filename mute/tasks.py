@@ -20,6 +20,7 @@ from mute.support.errors import MuteError
 
 __all__ = [
     "DEFAULT_TASK",
+    "DREAMWAQ_TASK",
     "FLAT_TASK",
     "PAPERS_PHASE_TERMS",
     "QUIET_TERM_TASKS",
@@ -34,6 +35,9 @@ DEFAULT_TASK = "go1_mute"
 FLAT_TASK = "go1_mute_flat"
 """The recipe on flat ground, of minutes: by it parts and quiet terms are compared, and its robots
 are those of whatever drives without a task of its own."""
+
+DREAMWAQ_TASK = "go1_dreamwaq"
+"""The learned walk that the paper compares MUTE with."""
 
 PAPERS_PHASE_TERMS = tuple(name for name, term in paper_terms().items() if term.group == "phase")
 """Names of what the paper is quiet by."""
@@ -314,7 +318,7 @@ _TASKS: dict[str, Callable[[], TaskCfg]] = {
     DEFAULT_TASK: _go1_mute,
     FLAT_TASK: _go1_mute_flat,
     "go1_mute_paper": _go1_mute_paper,
-    "go1_dreamwaq": _go1_dreamwaq,
+    DREAMWAQ_TASK: _go1_dreamwaq,
     **_QUIET_TERM_TASKS,
 }
 

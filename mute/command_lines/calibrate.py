@@ -50,7 +50,7 @@ from mute.evaluation.usual_robots import robots_cfg
 from mute.support.errors import MuteError
 from mute.support.provenance import current_commit, file_sha256, machine_kind, place_of
 from mute.support.ranges import Range
-from mute.support.resources import RESOURCES
+from mute.support.resources import shipped_file
 from mute.tasks import FLAT_TASK
 
 __all__ = ["REFERENCES", "CalibrationArgs", "fit_share", "fitted", "main", "provenance"]
@@ -72,7 +72,7 @@ class CalibrationArgs(PolicyArgs):
     The policy stands for the one that the paper measured.
     """
 
-    policy: Path = RESOURCES / "go1" / f"{FLAT_TASK}.pt"
+    policy: Path = shipped_file(FLAT_TASK)
     """Policy that walks, a checkpoint, or 'latest' for the newest one under --log-dir; by default
     that of go1_mute_flat."""
     reference: Literal["mute", "dreamwaq"] = "mute"

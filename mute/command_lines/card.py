@@ -27,7 +27,7 @@ from mute.evaluation.tables import read_json
 from mute.support.errors import MuteError
 from mute.support.files import write_file
 from mute.support.provenance import REPOSITORY, file_sha256
-from mute.support.resources import RESOURCES
+from mute.support.resources import shipped_file
 from mute.tasks import DEFAULT_TASK, FLAT_TASK
 
 __all__ = ["CardArgs", "main", "read_benchmarks", "read_results"]
@@ -39,9 +39,9 @@ _DOCS = REPOSITORY / "docs"
 class CardArgs:
     """Arguments of the card."""
 
-    card: Path = RESOURCES / "go1" / f"{DEFAULT_TASK}.json"
+    card: Path = shipped_file(DEFAULT_TASK, ".json")
     """Card of the policy, that `mute.release` wrote."""
-    flat_card: Path = RESOURCES / "go1" / f"{FLAT_TASK}.json"
+    flat_card: Path = shipped_file(FLAT_TASK, ".json")
     """Card of the policy of flat ground alone, likewise."""
     noise: Path = _DOCS / "noise" / "noise.json"
     """File that `evaluate.py noise` wrote; those of the sweeps and of the walk lie beside it."""

@@ -40,20 +40,19 @@ from mute.support.files import write_file
 from mute.support.plain_data import without_nan
 from mute.support.provenance import place_of
 from mute.support.ranges import Range
-from mute.support.resources import RESOURCES
-from mute.tasks import DEFAULT_TASK
+from mute.support.resources import RESOURCES, shipped_file
+from mute.tasks import DEFAULT_TASK, DREAMWAQ_TASK
 
 __all__ = ["PARTS", "PaperArgs", "paper"]
 
 PARTS = ("calibration", "levels", "sweep", "walk")
 """What the comparison is made of."""
 
-_POLICIES = RESOURCES / "go1"
 _COURSES = RESOURCES / "courses"
 
 
 def _that_ship(task: str) -> tuple[Path, ...]:
-    path = _POLICIES / f"{task}.pt"
+    path = shipped_file(task)
     return (path,) if path.is_file() else ()
 
 
@@ -68,7 +67,7 @@ class PaperArgs:
 
     mute: tuple[Path, ...] = _that_ship(DEFAULT_TASK)
     """MUTE's policies; several are trainings of one recipe."""
-    dreamwaq: tuple[Path, ...] = _that_ship("go1_dreamwaq")
+    dreamwaq: tuple[Path, ...] = _that_ship(DREAMWAQ_TASK)
     """DreamWaQ's; by default the one that ships, if one does."""
     others: tuple[str, ...] = ()
     """Further policies to compare, NAME=FILE, several of one name being trainings of one recipe; a

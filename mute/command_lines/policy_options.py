@@ -19,13 +19,13 @@ from mute.controllers.mpc.driver import MpcDriver
 from mute.controllers.mpc.settings import MpcCfg
 from mute.controllers.onnx_policy import load_onnx_policy
 from mute.support.errors import MuteError
-from mute.support.resources import RESOURCES
+from mute.support.resources import shipped_file
 from mute.tasks import DEFAULT_TASK, make_task
 
 __all__ = ["DriverArgs", "PolicyArgs", "check_audible", "policies_that_ship"]
 
 
-_SHIPPED = RESOURCES / "go1" / f"{DEFAULT_TASK}.pt"
+_SHIPPED = shipped_file(DEFAULT_TASK)
 
 
 @dataclass
@@ -173,7 +173,7 @@ def policies_that_ship() -> list[Path]:
 
 
 def _that_ships(task: str) -> Path:
-    path = _SHIPPED.with_name(f"{task}.pt")
+    path = shipped_file(task)
     if not path.is_file():
         raise MuteError(
             f"no policy ships for task {task!r} ({path} is missing): learn one with "

@@ -22,12 +22,11 @@ from mute.controllers.onnx_export import export_policy
 from mute.envs.observations import OBS_DIM
 from mute.learning.runner import MuteRunner, policy_part
 from mute.support.files import write_file
-from mute.tasks import make_task
+from mute.tasks import DREAMWAQ_TASK, make_task
 from mute.web.reference_walks import OnnxController
 
 __all__ = ["write_history_reference"]
 
-_TASK = "go1_dreamwaq"
 _STEPS = 200
 """Control steps that are acted."""
 _HIDDEN = (24, 16)
@@ -57,16 +56,16 @@ def write_history_reference(out: Path) -> list[Path]:
 
 
 def _untrained() -> Policy:
-    task = make_task(_TASK)
+    task = make_task(DREAMWAQ_TASK)
     network = dataclasses.replace(task.agent.estimation.network, history_hidden=_HIDDEN)
     estimation = dataclasses.replace(task.agent.estimation, network=network, num_mini_batches=1)
     agent = dataclasses.replace(
         task.agent, actor_hidden=_HIDDEN, critic_hidden=_HIDDEN, estimation=estimation
     )
     cfg = TaskCfg(env=dataclasses.replace(task.env, num_envs=2, num_threads=1), agent=agent)
-    runner = MuteRunner(_TASK, cfg, None)
-    payload = runner.alg.save() | {"task": _TASK, "config": to_plain(cfg), "iter": 0}
+    runner = MuteRunner(DREAMWAQ_TASK, cfg, None)
+    payload = runner.alg.save() | {"task": DREAMWAQ_TASK, "config": to_plain(cfg), "iter": 0}
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{_TASK}.pt"
+        path = Path(folder) / f"{DREAMWAQ_TASK}.pt"
         save_checkpoint(path, policy_part(payload))
         return load_policy(path)
