@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 from numpy.typing import NDArray
+from places import SHIPPED_POLICY
 
 from mute.acoustics.audible_env import audible_cfg
 from mute.acoustics.files.reading import read_wav
@@ -25,15 +26,13 @@ from mute.controllers.command import Command
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.evaluation.session import Session
 from mute.evaluation.trials import evaluation_cfg, from_the_stance
-from mute.support.resources import RESOURCES
-from mute.tasks import DEFAULT_TASK
 
 SECONDS = 4.0
 SEED = 3
 
 
 def _make_session(surface: str | None, listener_wav=None) -> Session:
-    policy = load_policy(RESOURCES / "go1" / f"{DEFAULT_TASK}.pt")
+    policy = load_policy(SHIPPED_POLICY)
     cfg = from_the_stance(evaluation_cfg(policy.cfg.env, 1, 60.0, seed=0))
     env = QuadrupedEnv(audible_cfg(cfg, surface))
     listener = None

@@ -7,6 +7,7 @@ import math
 
 import pytest
 import torch
+from places import FLAT_POLICY
 
 from mute.config import TaskCfg
 from mute.controllers import LearnedController, load_policy
@@ -16,7 +17,6 @@ from mute.envs.observations import OBSERVATION_WIDTHS, policy_observation, slice
 from mute.envs.quadruped_env import QuadrupedEnv
 from mute.envs.randomization import RandomizationCfg
 from mute.evaluation.trials import evaluation_cfg
-from mute.support.resources import RESOURCES
 
 _SCALES = TaskCfg().env.observations.scales
 _PARTS = slices(OBSERVATION_WIDTHS)
@@ -106,7 +106,7 @@ def test_it_takes_left_and_right_alike():
 
 
 def _flat_policy(gain: float) -> Policy:
-    return load_policy(RESOURCES / "go1" / "go1_mute_flat.pt").with_heading_gain(gain)
+    return load_policy(FLAT_POLICY).with_heading_gain(gain)
 
 
 def _headings_off(gain: float) -> torch.Tensor:

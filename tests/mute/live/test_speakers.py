@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import soundfile
 from numpy.typing import NDArray
+from places import SHIPPED_POLICY
 
 from mute.acoustics.audible_env import audible_cfg
 from mute.acoustics.live_sound import LiveSound
@@ -25,8 +26,6 @@ from mute.live import speakers as speakers_module
 from mute.live.loudness import FULL_SCALE, Loudness
 from mute.live.speakers import Play, Speakers, check_default_output, open_default_output
 from mute.support.errors import MuteError
-from mute.support.resources import RESOURCES
-from mute.tasks import DEFAULT_TASK
 
 RATE = 48000
 
@@ -61,7 +60,7 @@ class Output:
 
 
 def _walk(surface: str) -> Session:
-    policy = load_policy(RESOURCES / "go1" / f"{DEFAULT_TASK}.pt")
+    policy = load_policy(SHIPPED_POLICY)
     cfg = from_the_stance(evaluation_cfg(policy.cfg.env, 1, 60.0, seed=0))
     env = QuadrupedEnv(audible_cfg(cfg, surface))
     return Session(env, policy.controller(env.cfg), Command(0.6, 0.0, 0.0, 0.5))
